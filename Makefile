@@ -34,9 +34,11 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 # done, but not of an older report where the run is refused; a report of failures is a failure.
 define RUN
 @mkdir -p .snakemake && touch .snakemake/begun; $(SNAKEMAKE) $(1); status=$$?; \
-test $$status != 0 || test ! -f results/report/log \
-  || test results/report/log -nt .snakemake/begun || tail -n 1 results/report/log; \
-test $$status != 0 || ! test -s results/report/failures.txt || status=1; exit $$status
+if test $$status = 0; then \
+  test ! -f results/report/log || test results/report/log -nt .snakemake/begun \
+    || tail -n 1 results/report/log; \
+  test ! -s results/report/failures.txt || status=1; \
+fi; exit $$status
 endef
 
 .PHONY: help all-cases family case report pictures summary compare bench orders study

@@ -10,7 +10,7 @@ from msgspec import Meta, field, structs
 from msgspec.structs import force_setattr
 
 from .expressions import Exact, Expression
-from .typed import FieldError, Number, Positive, Section, Text
+from .typed import ONCE, FieldError, Number, Positive, Section, Text
 
 # A load factor, or the factors of named loads and supports.
 Step = float | dict[str, float]
@@ -139,7 +139,6 @@ _SPRING = "a mapping of x, y, z, normal to positive numbers or expressions"
 _FIX = "a list of x, y, z, normal, or a mapping of them to imposed values"
 _STRAIN = "a mapping of xx, yy, zz, xy, yz, xz to numbers or expressions"
 _TOGETHER = "a list of x, y, z"
-_EACH_ONCE = {"uniqueItems": True}
 _Component = Literal["xx", "yy", "zz", "xy", "yz", "xz"]
 Components = Annotated[dict[_Component, Scalar], Meta(min_length=1)]
 if TYPE_CHECKING:
@@ -147,15 +146,13 @@ if TYPE_CHECKING:
     _Springs: TypeAlias = dict[str, Scalar]
 else:
     _Fix = Annotated[
-        _Fixed | _Imposed, Meta(description=_FIX, extra_json_schema=_EACH_ONCE, extra=VALUE)
+        _Fixed | _Imposed,
+        Meta(description=_FIX, extra_json_schema=ONCE.extra_json_schema, extra=VALUE),
     ]
     _Springs = Annotated[
         dict[_Axis, Scalar], Meta(min_length=1, description=_SPRING, extra=EXPRESSION)
     ]
-_Together = Annotated[
-    tuple[Literal["x", "y", "z"], ...],
-    Meta(min_length=1, description=_TOGETHER, extra_json_schema=_EACH_ONCE),
-]
+_Together = Annotated[tuple[Literal["x", "y", "z"], ...], ONCE, Meta(description=_TOGETHER)]
 
 
 class Cyclic(Section, frozen=True):

@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 
 from ..lac.cells.catalogue import BY_NAME
-from ..lac.cells.faces import FaceBlock, nodes_of
+from ..lac.cells.faces import FaceBlock, surface_nodes
 from ..lac.errors import SolveError
 from ..mesh.files.abaqus import data_lines, face_number
 from ..system.errors import InputError
@@ -278,7 +278,7 @@ def _faces(deck: Deck, blocks: Sequence[FaceBlock]) -> Iterator[tuple[int, int]]
 def _flat(deck: Deck) -> bool:
     """Whether the slave surface of each pair lies in a plane."""
     for pair in deck.pairs:
-        nodes = nodes_of(pair.slave)
+        nodes = surface_nodes(pair.slave)
         away = deck.points[nodes] - deck.points[nodes].mean(axis=0)
         sizes = np.linalg.svd(away, compute_uv=False)
         if len(sizes) == away.shape[1] and sizes[-1] > _PLANE * sizes[0]:

@@ -19,7 +19,6 @@ from ..lac.cells.faces import (
     surface_vectors,
 )
 from ..lac.cells.shape import gauss_rule
-from ..mechanics.fem.faces import volume_cells
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 from ..system.errors import InputError
@@ -219,7 +218,7 @@ def own_solution(
     turned = [(name, right_side_out(points, data, cell_type(name))[0]) for name, data in blocks]
     cells = meshio.Mesh(points, turned)
     frame, n = model.solution, len(points)
-    faces = list(outer_faces(volume_cells(cells)))
+    faces = list(outer_faces(turned))
     zones = [zone for s in pressures if (zone := _zone(points, faces, s, model)) is not None]
     fields = {"displacement": np.full((n, dim), np.nan), "stress": np.full((n, 6), np.nan)}
     for name, values in fields.items():

@@ -11,7 +11,7 @@ from ..case.expressions import evaluate
 from ..case.file import Zone
 from ..case.material import Material
 from ..case.model import Case
-from ..lac.cells.faces import FaceBlock, nodes_of, normals_of
+from ..lac.cells.faces import FaceBlock, surface_nodes, surface_normals
 from ..lac.cut import cut
 from ..mechanics.fem.bodies import body_numbers
 from ..mechanics.fem.faces import volume_cells
@@ -125,7 +125,7 @@ def closing(
 
 def _mean_normal(points: np.ndarray, faces: list[FaceBlock]) -> np.ndarray:
     """The direction of the sum of normals at nodes; zero for a closed surface."""
-    total = normals_of(points, faces)[nodes_of(faces)].mean(axis=0)
+    total = surface_normals(points, faces)[surface_nodes(faces)].mean(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > _ALONG else np.zeros_like(total)
 
@@ -136,10 +136,10 @@ def _gaps(
     """About the initial gap at the nodes of one side: to the plane at the other's nearest node."""
     from scipy.spatial import cKDTree
 
-    nodes, others = nodes_of(mine), nodes_of(other)
+    nodes, others = surface_nodes(mine), surface_nodes(other)
     if zone.clearance is not None:
         return evaluate(zone.clearance, points[nodes]) - zone.interference
-    normals = normals_of(points, other)[others]
+    normals = surface_normals(points, other)[others]
     near = cKDTree(points[others]).query(points[nodes])[1]
     offset = points[nodes] - points[others][near]
     return np.einsum("nd,nd->n", offset, normals[near]) - zone.interference
@@ -318,7 +318,7 @@ def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFace
     gap = None
     if zone.clearance is not None:
         gap = np.full(len(mesh.points), np.nan)
-        nodes = nodes_of(slave)
+        nodes = surface_nodes(slave)
         gap[nodes] = evaluate(zone.clearance, mesh.points[nodes, :flat]) - zone.interference
     return PairedFaces(zone=zone, slave=slave, master=master, gap=gap)
 

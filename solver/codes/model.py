@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from ..case.model import Case
-from ..lac.cells.faces import FaceBlock, nodal_normals, nodes_of, surface_points
+from ..lac.cells.faces import FaceBlock, nodal_normals, surface_nodes, surface_points
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.results import body_infos
 from ..simulation.results.solution import Solution, ZoneResult
@@ -108,7 +108,7 @@ class Model:
 
     def _zone(self, zone: ZoneScene) -> ZoneResult:
         surface, m = zone.operator.surface, zone.count
-        slave, master = nodes_of(zone.slave_faces), nodes_of(zone.master_faces)
+        slave, master = surface_nodes(zone.slave_faces), surface_nodes(zone.master_faces)
         none = np.full(m, np.nan)
         return ZoneResult(
             name=zone.zone.name,

@@ -15,7 +15,7 @@ from msgspec import structs
 from scipy.spatial import cKDTree
 
 from ..case.material import Material
-from ..lac.cells.faces import FaceBlock, nodes_of, normals_of
+from ..lac.cells.faces import FaceBlock, surface_nodes, surface_normals
 from .deck import Deck, PairedFaces, UnsupportedError
 from .layer import columns
 
@@ -68,18 +68,18 @@ def _meshed_gap(deck: Deck, pair: PairedFaces) -> np.ndarray:
     The nearest node of the master is at an offset along the surface. On a circle, an offset is
     across the mean of the normals at its two ends.
     """
-    nodes, others = nodes_of(pair.slave), nodes_of(pair.master)
+    nodes, others = surface_nodes(pair.slave), surface_nodes(pair.master)
     _, near = cKDTree(deck.points[others]).query(deck.points[nodes])
     facing = others[near]
-    outward, inward = (normals_of(deck.points, side) for side in (pair.master, pair.slave))
+    outward, inward = (surface_normals(deck.points, side) for side in (pair.master, pair.slave))
     normals = (outward[facing] - inward[nodes]) / 2
     return np.einsum("nd,nd->n", deck.points[nodes] - deck.points[facing], normals)
 
 
 def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     pair, size = deck.pairs[number], len(deck.points)
-    nodes = nodes_of(pair.slave)
-    normals = normals_of(deck.points, pair.slave)[nodes]
+    nodes = surface_nodes(pair.slave)
+    normals = surface_normals(deck.points, pair.slave)[nodes]
     shift = _shift(deck, pair, nodes)
     thick = _THIN * np.ptp(deck.points, axis=0).max()
     heights = np.array([-thick, 0.0, -thick / 2])[:, None] + shift
@@ -134,8 +134,8 @@ def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
 
 def _are_flat(deck: Deck, pair: PairedFaces) -> bool:
     """Whether the normals of both sides agree everywhere."""
-    outward = normals_of(deck.points, pair.slave)[nodes_of(pair.slave)]
-    facing = normals_of(deck.points, pair.master)[nodes_of(pair.master)]
+    outward = surface_normals(deck.points, pair.slave)[surface_nodes(pair.slave)]
+    facing = surface_normals(deck.points, pair.master)[surface_nodes(pair.master)]
     return bool(np.abs(np.concatenate([-outward, facing]) - facing[0]).max() < _FLAT)
 
 
@@ -145,8 +145,8 @@ def _shift(deck: Deck, pair: PairedFaces, nodes: np.ndarray) -> np.ndarray:
         return np.full(len(nodes), pair.zone.interference)
     if not _are_flat(deck, pair):
         raise UnsupportedError("initial gap by place on curved faces: CalculiX takes one number")
-    other = nodes_of(pair.master)[0]
-    facing = normals_of(deck.points, pair.master)[other]
+    other = surface_nodes(pair.master)[0]
+    facing = surface_normals(deck.points, pair.master)[other]
     return (deck.points[nodes] - deck.points[other]) @ facing - pair.gap[nodes]
 
 

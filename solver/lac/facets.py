@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .cells.catalogue import CellType
-from .cells.faces import area_vectors, nodes_of, normals_of, surface_vectors
+from .cells.faces import area_vectors, surface_nodes, surface_normals, surface_vectors
 from .cells.shape import invert, shape_functions
 from .errors import SolveError
 
@@ -67,7 +67,7 @@ def with_nodal_normals(blocks: list[Facets], points: np.ndarray) -> list[Facets]
     >>> with_nodal_normals([master], points)[0].directions is None
     True
     """
-    normals = normals_of(points, blocks)
+    normals = surface_normals(points, blocks)
     differ = max(np.abs(normals[b.nodes] - b.normal[:, None]).max(initial=0.0) for b in blocks)
     if differ <= FLAT:
         return blocks
@@ -326,8 +326,8 @@ def with_master_normals(
     >>> with_master_normals([slave], [master], points)[0].directions is None
     True
     """
-    normals = normals_of(points, masters)
-    nodes = nodes_of(slaves)
+    normals = surface_normals(points, masters)
+    nodes = surface_nodes(slaves)
     directions = np.zeros_like(points)
     directions[nodes] = -_nearest_normals(points[nodes], masters, normals)
     return with_directions(slaves, directions)

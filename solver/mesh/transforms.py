@@ -89,7 +89,7 @@ def _freedom(points: np.ndarray, volumes: _Volumes) -> np.ndarray:
     """For each node the projector (n, dim, dim) on the directions in which the sides let it go."""
     dim = points.shape[1]
     spread = np.zeros((len(points), dim, dim))
-    for kind, nodes in outer_faces({cell.name: nodes for cell, nodes in volumes}):
+    for kind, nodes in outer_faces((cell.name, nodes) for cell, nodes in volumes):
         corners = nodes[:, : cell_type(kind).n_vertices]
         normals = _normals(points[corners])
         np.add.at(spread, corners, (normals[:, :, None] * normals[:, None, :])[:, None])

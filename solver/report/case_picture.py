@@ -98,7 +98,7 @@ def _whole(
     points += share * np.stack([ways[number] for number in range(len(ways))])[solution.body]
     faces = [face[:2] for part in drawn if part.meshed for face in part.faces]
     seen = _seen(faces, points, view) if dim == 3 else np.ones(len(points), dtype=bool)
-    faces = faces if dim == 3 else list(outer_faces(volume_cells(solution.mesh)))
+    faces = faces if dim == 3 else list(outer_faces(volume_cells(solution.mesh).items()))
     labels = Symbols(solution, view, points, seen, faces).draw()
     for part, places in zip(drawn, flat, strict=True):
         if part.zone is None:

@@ -79,8 +79,8 @@ def parts(solution: Solution) -> Iterator[DrawnPart]:
 
 def outside(mesh: meshio.Mesh) -> list[tuple[str, np.ndarray]]:
     """The faces that are seen, by type: cells in the plane, else the outer faces."""
-    cells = volume_cells(mesh)
-    return list(cells.items() if mesh.points.shape[1] == 2 else outer_faces(cells))
+    cells = volume_cells(mesh).items()
+    return list(cells if mesh.points.shape[1] == 2 else outer_faces(cells))
 
 
 def rigid_surface(

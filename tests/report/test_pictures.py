@@ -150,7 +150,7 @@ def test_boundary_of_two_cubes_on_each_other():
     points = np.array(layers, dtype=float)
     cubes = np.array([[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 8, 9, 10, 11]])
     mesh = meshio.Mesh(points, [("hexahedron", cubes)])
-    [(kind, faces)] = outer_faces(volume_cells(mesh))
+    [(kind, faces)] = outer_faces(volume_cells(mesh).items())
     assert kind == "QUAD4"
     assert len(faces) == 10
     centre = points[faces].mean(axis=1)

@@ -1,6 +1,6 @@
 """Faces of cells: who owns them, outward normals, quadrature points; cells right side out."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -124,10 +124,12 @@ def corner_sets(faces: list[np.ndarray]) -> np.ndarray:
     return np.concatenate(rows) if rows else np.empty((0, 4), dtype=int)
 
 
-def outer_faces(cells: Mapping[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
-    """The faces that belong to one of the cells (by type) only, outward: (type, (n, nodes))."""
+def outer_faces(
+    cells: Iterable[tuple[str, np.ndarray]],
+) -> Iterator[tuple[str, np.ndarray]]:
+    """The faces of one cell only, turned outward, of `cells` (type, nodes): (type, (n, nodes))."""
     by_type: dict[str, list[np.ndarray]] = {}
-    for name, nodes in cells.items():
+    for name, nodes in cells:
         for face in cell_type(name).faces:
             by_type.setdefault(face.type, []).append(nodes[:, list(face.nodes)])
     faces = {kind: np.concatenate(parts) for kind, parts in by_type.items()}
@@ -180,12 +182,12 @@ def surface_vectors(
     return values, vectors
 
 
-def nodes_of(blocks: Sequence[Any]) -> np.ndarray:
+def surface_nodes(blocks: Sequence[Any]) -> np.ndarray:
     """The nodes (k,) of blocks of faces, each once, ascending."""
     return np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
 
 
-def normals_of(points: np.ndarray, blocks: Sequence[Any]) -> np.ndarray:
+def surface_normals(points: np.ndarray, blocks: Sequence[Any]) -> np.ndarray:
     """The `nodal_normals` of blocks of faces."""
     return nodal_normals(points, [(block.type.name, block.nodes) for block in blocks])
 

@@ -25,7 +25,7 @@ from typing import Self
 import numpy as np
 
 from ...lac.cells.catalogue import CellType
-from ...lac.cells.faces import nodal_normals, nodes_of
+from ...lac.cells.faces import nodal_normals, surface_nodes
 from ...lac.cells.shape import gauss_rule, shape_functions
 from ...lac.facets import Facets, project_along
 from ...lac.multipliers import InterfaceData, Multipliers
@@ -252,7 +252,7 @@ def at_nodes(slaves: list[Facets]) -> list[Samples]:
     >>> at_nodes([master])[0].weight.round(15).tolist()
     [[0.5, 0.5], [0.5, 0.5]]
     """
-    nodes = nodes_of(slaves)
+    nodes = surface_nodes(slaves)
     places = np.empty((len(nodes), slaves[0].centre.shape[1]))
     numbers = [np.searchsorted(nodes, block.nodes) for block in slaves]
     for block, number in zip(slaves, numbers, strict=True):

@@ -1,10 +1,11 @@
 """Friction with given bounds: the convex problem of Tresca, as a cone program in the jumps alone.
 
-With z = (∫ gap, ∫ slip by tangent) of the macro-elements, S the forces that unit jumps bring up
+With z = (gap, slip by tangent), means over macro-elements, S the forces that unit jumps bring up
 with everything closed and stuck, and λ₀ the forces at z = 0, equilibrium is the minimum of
-½ zᵀSz + λ₀ᵀz + Σ bᵢ |z_t,i| over z_n ≥ 0, and λ = λ₀ + S z are pressures and tractions. Coulomb's
-friction is the fixed point b = μp. Source: Panagiotopoulos, A nonlinear programming approach to the
-unilateral contact and friction boundary value problem, Ingenieur-Archiv 44 (1975) 421–432.
+½ zᵀSz + λ₀ᵀz + Σ bᵢ |z_t,i| over z_n ≥ 0, and λ = λ₀ + S z are the forces: pressures and tractions
+times areas. Coulomb's friction is the fixed point b = μλ_n. Source: Panagiotopoulos, A nonlinear
+programming approach to the unilateral contact and friction boundary value problem, Ingenieur-Archiv
+44 (1975) 421–432.
 """
 
 from typing import Any
@@ -49,7 +50,7 @@ def coulomb_by_cones(
         try:
             z = _minimum(matrix(whole), matrix(goal), *cones)[:r]
         except ValueError:  # from inside CVXOPT: the program has no minimum
-            return found * size, z * size / unit, False
+            break
         found = start + s @ z
         fresh = friction * np.maximum(found[of], 0.0)
         settled = bool(np.abs(fresh - bounds).max(initial=0.0) <= _SETTLED)

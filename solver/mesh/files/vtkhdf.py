@@ -113,11 +113,11 @@ def read_cells(group: h5py.Group) -> tuple[list[tuple[str, np.ndarray]], list[tu
     """
     offsets, types = group["Offsets"][()], group["Types"][()]
     connectivity = group["Connectivity"][()]
-    if unknown := set(types.tolist()) - set(_BY_VTK):
-        allowed = f"allowed: {', '.join(BY_NAME)}"
-        raise InputError(group.file.filename, "cell type", min(unknown), allowed)
     breaks = np.flatnonzero(np.diff(types)) + 1
     bounds = list(pairwise([0, *breaks.tolist(), len(types)]))
+    if unknown := {int(types[start]) for start, _ in bounds} - set(_BY_VTK):
+        allowed = f"allowed: {', '.join(BY_NAME)}"
+        raise InputError(group.file.filename, "cell type", min(unknown), allowed)
     cells = []
     for start, stop in bounds:
         cell = _BY_VTK[int(types[start])]

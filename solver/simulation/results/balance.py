@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from ...lac.cells.faces import nodes_of, surface_points
+from ...lac.cells.faces import surface_nodes, surface_points
 from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.faces import face_integrals
 from ...mechanics.fem.supports import DEPENDENT
@@ -270,7 +270,7 @@ def resultants(
     forces = zone.forces(state.pressure)
     if field is not None:
         forces = forces + field.force
-    nodes = nodes_of(zone.sub_faces)
+    nodes = surface_nodes(zone.sub_faces)
     force = forces.reshape(scene.points.shape)[nodes]
     return Resultants(
         area=area,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...case.acting import Probe
 from ...lac.cells.catalogue import BY_NAME
-from ...lac.cells.faces import nodes_of, normals_of
+from ...lac.cells.faces import surface_nodes, surface_normals
 from ...lac.facets import tangents_of
 from ...mechanics.fem.locate import Located, locate
 from ...mechanics.fem.stress import nodal_stress, normal_stress
@@ -140,9 +140,9 @@ def _zone_result(
     step: StepResult,
 ) -> ZoneResult:
     surface = zone.operator.surface
-    slave_nodes, master_nodes = nodes_of(zone.sub_faces), nodes_of(zone.master_faces)
-    slave_normal = normals_of(scene.points, zone.sub_faces)[slave_nodes]
-    master_normal = normals_of(scene.points, zone.master_faces)[master_nodes]
+    slave_nodes, master_nodes = surface_nodes(zone.sub_faces), surface_nodes(zone.master_faces)
+    slave_normal = surface_normals(scene.points, zone.sub_faces)[slave_nodes]
+    master_normal = surface_normals(scene.points, zone.master_faces)[master_nodes]
     return ZoneResult(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
@@ -174,7 +174,7 @@ def _recovered_pressure(
     if field is None or field.name == "none":
         return None
     local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
-    nodes = nodes_of(zone.sub_faces)
+    nodes = surface_nodes(zone.sub_faces)
     found = RecoveredPressure(
         form=field.name,
         coefficients=field.coefficients.reshape(len(pressure), -1),

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from ...case.file import Zone
 from ...lac.cells.catalogue import BY_NAME
-from ...lac.cells.faces import FACE_POINTS, FaceBlock, normals_of, surface_points
+from ...lac.cells.faces import FACE_POINTS, FaceBlock, surface_normals, surface_points
 from ...lac.cut import SubFaces
 from ...lac.facets import Facets, facets, with_directions, with_master_normals, with_nodal_normals
 from ...lac.multipliers import constants
@@ -95,7 +95,7 @@ def _sharpest(masters: Sequence[Facets], points: np.ndarray) -> tuple[float, np.
 
     The angle is in radians, half the angle of an edge between two faces.
     """
-    normals = normals_of(points, masters)
+    normals = surface_normals(points, masters)
     found = []
     for block in masters:
         cosine = np.einsum("fad,fd->fa", normals[block.nodes], block.normal)

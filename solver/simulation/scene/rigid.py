@@ -11,7 +11,7 @@ import numpy as np
 
 from ...case.model import Case
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
-from ...lac.cells.faces import normals_of
+from ...lac.cells.faces import surface_normals
 from ...mechanics.fem.faces import FaceError, boundary_faces
 from ...mechanics.fem.layer import layer, turned
 from ...mechanics.fem.supports import SAME, Fixed
@@ -115,7 +115,7 @@ def _slave_normals(case: Case, mesh: meshio.Mesh, name: str) -> np.ndarray:
             faces = boundary_faces(mesh, other)
         except FaceError as error:
             raise InputError(case.path, "contact", other, str(error)) from None
-        normals = normals_of(mesh.points, faces)
+        normals = surface_normals(mesh.points, faces)
         used = np.flatnonzero(normals.any(axis=1))
         found.append(np.hstack([mesh.points[used], normals[used]]))
     return np.concatenate(found[1:] or found)

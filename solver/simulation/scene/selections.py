@@ -137,7 +137,7 @@ def _with_outer_faces(mesh: meshio.Mesh) -> meshio.Mesh:
     cells = {block.type: block.data for block in mesh.cells}
     sets = {name: list(parts) for name, parts in mesh.cell_sets.items()}
     outer = {name: np.empty(0, dtype=int) for name in cells}
-    for kind, nodes in outer_faces(volume_cells(mesh)):
+    for kind, nodes in outer_faces(volume_cells(mesh).items()):
         name = BY_NAME[kind].meshio
         if name not in cells:
             cells[name] = np.empty((0, nodes.shape[1]), dtype=nodes.dtype)
