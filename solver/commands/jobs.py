@@ -237,7 +237,7 @@ def _mesh_files(case: Case) -> list[str] | None:
     path = Path(case.mesh["path"])
     if path.suffix.lower() != ".inp":
         return [str(path)]
-    from ..mesh.files.abaqus import files_of
+    from ..mesh.files.deck_lines import files_of
 
     return [str(file) for file in files_of(path)]
 

@@ -16,6 +16,7 @@ integrated at the points of the gap operator. Where a segment is flat they are i
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,9 +43,9 @@ def levers(given: Sequence[tuple[Segments, np.ndarray]], normal: np.ndarray, k: 
     """
     m, dim = normal.shape
     couples = np.zeros((dim - 1, m, k, 3))
-    for by_macro, tangents in zip(couples, np.swapaxes(tangents_of(normal), 0, 1), strict=True):
+    for by_macro, tangent in zip(couples, tangents(normal), strict=True):
         for segments, psi in given:
-            pair = segments.normal, along_faces(segments, tangents)
+            pair = segments.normal, along_faces(segments, tangent)
             n, t = (np.pad(v, [(0, 0), (0, 0), (0, 3 - dim)]) for v in pair)
             weight = segments.weight * segments.gap
             couple = np.einsum("sq,sqk,sqd->skd", weight, psi, np.cross(n, t))
@@ -52,35 +53,54 @@ def levers(given: Sequence[tuple[Segments, np.ndarray]], normal: np.ndarray, k: 
     return couples
 
 
-def along_faces(segments: Segments, tangents: np.ndarray) -> np.ndarray:
-    """Unit tangents (s, q, dim) in the face at the points of segments, next to `tangents` (m, dim).
+class Tangent(NamedTuple):
+    """One tangent of each macro-element: `normal` (m, dim), its mean one, and `along` (m, dim)."""
+
+    normal: np.ndarray
+    along: np.ndarray
+
+
+def tangents(normal: np.ndarray) -> list[Tangent]:
+    """The dim − 1 tangents of macro-elements with mean normals (m, dim)."""
+    return [Tangent(normal, along) for along in np.swapaxes(tangents_of(normal), 0, 1)]
+
+
+def along_faces(segments: Segments, tangent: Tangent) -> np.ndarray:
+    """Unit tangents (s, q, dim) in the face at the points of segments.
+
+    The smallest rotation from the mean normal a of the macro-element to the normal n at the point
+    turns its tangent t to t − (t · n) (a + n)/(1 + a · n). This is linear in t, so that results do
+    not depend on the frame of the macro-element, nor on the axes.
 
     >>> (segments,) = intersect([slave], 0, [master], 1.0)
-    >>> along_faces(segments, np.array([[0.6, 0.8]]))[0, 0].tolist()
+    >>> tilted = Tangent(np.array([[-0.8, 0.6]]), np.array([[0.6, 0.8]]))
+    >>> along_faces(segments, tilted)[0, 0].round(15).tolist()
     [1.0, 0.0]
     """
-    normal, tangent = segments.normal, tangents[segments.macro][:, None]
-    found = tangent - (tangent * normal).sum(axis=-1, keepdims=True) * normal
-    return np.asarray(found / np.linalg.norm(found, axis=-1, keepdims=True))
+    n = segments.normal
+    a, t = (vectors[segments.macro][:, None] for vectors in tangent)
+    out, level = ((vectors * n).sum(axis=-1, keepdims=True) for vectors in (t, a))
+    return np.asarray(t - out / (1 + level) * (a + n))
 
 
-def turned_along(part: Integrals, tangents: np.ndarray) -> Integrals:
-    """The integrals of a part with ∫ N t in place of ∫ N n, t next to `tangents` (m, dim).
+def turned_along(part: Integrals, tangent: Tangent) -> Integrals:
+    """The integrals of a part with ∫ N t in place of ∫ N n.
 
     >>> (segments,) = intersect([slave], 0, [master], 1.0)
     >>> data = InterfaceData(slaves=[slave], samples=[], found=[segments], n_macro=1)
     >>> part = integrals(constants(data), segments)
-    >>> turned_along(part, np.array([[1.0, 0.0]])).vectors[MASTER][..., 0].round(15).tolist()
+    >>> tangent = Tangent(np.array([[0.0, 1.0]]), np.array([[1.0, 0.0]]))
+    >>> turned_along(part, tangent).vectors[MASTER][..., 0].round(15).tolist()
     [[[0.5, 0.5]], [[0.5, 0.5]]]
     """
-    slave, master = (_along(part, side, tangents)[:, None] for side in (SLAVE, MASTER))
+    slave, master = (_along(part, side, tangent)[:, None] for side in (SLAVE, MASTER))
     return replace(part, vectors=(slave, master))
 
 
-def _along(part: Integrals, side: int, tangents: np.ndarray) -> np.ndarray:
+def _along(part: Integrals, side: int, tangent: Tangent) -> np.ndarray:
     """∫ N t (s, n_nodes, dim) over segments; t is the tangent in the face at each point."""
     segments = part.segments
-    normal, t = segments.normal, along_faces(segments, tangents)
+    normal, t = segments.normal, along_faces(segments, tangent)
     flat = np.abs(normal - normal[:, :1]).max(axis=(1, 2), initial=0.0) <= _FLAT
     scalar = np.einsum("sad,sd->sa", part.vectors[side][:, 0], normal[:, 0])
     exact = scalar[..., None] * t[:, :1]

@@ -12,8 +12,8 @@ import numpy as np
 from scipy import sparse
 
 from .cells.catalogue import cell_type
-from .facets import Facets, tangents_of
-from .friction import levers, turned_along
+from .facets import Facets
+from .friction import levers, tangents, turned_along
 from .multipliers import (
     MASTER,
     SLAVE,
@@ -230,8 +230,8 @@ def slip_operator(
 ) -> tuple[sparse.csr_matrix, ...]:
     """The dim − 1 matrices (m, n_dofs) ∫ (N_master − N_slave) t, by tangent.
 
-    `parts`: the closed integrals of m macro-elements; `normal` (m, dim): their mean normals, whose
-    `tangents_of` are the frames.
+    `parts`: the closed integrals of m macro-elements; `normal` (m, dim): their mean normals,
+    whose `tangents` these are.
 
     A slave edge of length 2, whose tangent is −x, under two master edges:
 
@@ -244,8 +244,8 @@ def slip_operator(
     """
     shape = len(normal), n_nodes, normal.shape[1]
     found = []
-    for tangents in np.swapaxes(tangents_of(normal), 0, 1):
-        turned = [turned_along(part, tangents) for part in parts]
+    for tangent in tangents(normal):
+        turned = [turned_along(part, tangent) for part in parts]
         slave, master = (_assembled(turned, side, *shape) for side in (SLAVE, MASTER))
         along = (master - slave).tocsr()
         along.eliminate_zeros()

@@ -22,7 +22,7 @@ from scipy import sparse
 
 from .cells.faces import circumference
 from .facets import tangents_of
-from .friction import along_faces, levers
+from .friction import Tangent, along_faces, levers, tangents
 from .partners import Surface
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
@@ -140,8 +140,8 @@ def recovery(
         np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
         if form.sweeps:  # constants are not applied
             given.append((segments, psi[..., : k - (not form.keeps_means)]))
-    tangents = np.swapaxes(tangents_of(surface.normal), 0, 1) if asked.slip else ()
     near = _same_materials(asked, found)
+    along = tangents(surface.normal) if asked.slip else []
     stabilise, shape = asked.stabilise, (m, k, dim * n_nodes)
     return Recovery(
         form=form,
@@ -149,7 +149,7 @@ def recovery(
         near=near,
         loads=_loads(given, shape),
         products=products,
-        slip_loads=tuple(_loads(given, shape, t) for t in tangents),
+        slip_loads=tuple(_loads(given, shape, t) for t in along),
         levers=levers(given, surface.normal, k) if asked.slip else None,
         stabilisation=stabilise and stabilise(found, at, near, surface.covered),
     )
@@ -158,9 +158,9 @@ def recovery(
 def _loads(
     given: Sequence[tuple[Segments, np.ndarray]],
     shape: tuple[int, int, int],
-    tangents: np.ndarray | None = None,
+    tangent: Tangent | None = None,
 ) -> sparse.csr_matrix:
-    """∫ ψ (N_master − N_slave) n dS (m · k, n_dofs), or with `tangents` (m, dim) in place of n.
+    """∫ ψ (N_master − N_slave) n dS (m · k, n_dofs), or with a `tangent` in place of n.
 
     `given` are segments with the ψ (s, q, ≤ k) at their points, `shape` is m, k, n_dofs.
     """
@@ -168,7 +168,7 @@ def _loads(
     m, k, n_dofs = shape
     for segments, psi in given:
         weighted = segments.weight[..., None] * psi
-        along = segments.normal if tangents is None else along_faces(segments, tangents)
+        along = segments.normal if tangent is None else along_faces(segments, tangent)
         row = segments.macro[:, None] * k + np.arange(psi.shape[-1])
         dim = along.shape[-1]
         for sign, side in zip((-1.0, 1.0), segments.sides, strict=True):

@@ -1,12 +1,14 @@
 """Abaqus input files (.inp), read and written: nodes, cells, sets.
 
 Read here and not by meshio, which knows no *SURFACE, no plane strain quadrangles, and gives sets
-named in *ELEMENT to the wrong cells. Groups are written as *ELSET, *SURFACE and *NSET.
+named in *ELEMENT to the wrong cells. Groups are written as *ELSET, *SURFACE and *NSET. Lines,
+keywords and options are those of `deck_lines`; what is not understood is refused with its line.
 """
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import meshio
@@ -14,12 +16,13 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 from ...system.errors import InputError
+from .deck_lines import Block, keyword_blocks, number, place
 
 _SOLIDS = {k.n_nodes: name for name, k in BY_NAME.items() if k.dim == 3 and k.abaqus}
 _SURFACES = {kind.n_nodes: name for name, kind in BY_NAME.items() if kind.dim == 2}
 _LINES = {
     "T2D2": "SEG2", "T3D2": "SEG2", "B21": "SEG2", "B31": "SEG2", "R2D2": "SEG2",
-    "T2D3": "SEG3", "T3D3": "SEG3", "B22": "SEG3", "B32": "SEG3",
+    "T2D3": "SEG3", "T3D3": "SEG3", "B22": "SEG3", "B32": "SEG3", "B33": "SEG3",
 }  # fmt: skip
 # Node orders are the catalogue's, except that lines have their middle node second.
 _MIDDLE_SECOND = [0, 2, 1]
@@ -33,67 +36,44 @@ FACES = {
     "PENTA": ["123", "465", "1452", "2563", "3641"],
     "HEXA": ["1234", "5876", "1562", "2673", "3784", "4851"],
 }
-# Keywords that make or place nodes and cells in ways not supported here.
-_REFUSED = ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "NMAP", "SYSTEM")
+# Faces of the cells of a surface that are the cells themselves.
+_ITSELF = ("", "SPOS", "SNEG")
 
 
 def read(path: Path) -> meshio.Mesh:
     """The mesh of an input file; *ELSET, *SURFACE and *NSET are its groups.
 
-    At most one part and one instance, placed at the origin. Raises InputError for element types and
-    keywords that are not followed.
+    At most one part and one instance, placed at the origin. Raises InputError, with the line, for
+    element types, keywords and options that are not followed.
     """
     deck = _Deck(path)
-    for keyword, options, lines in _keywords(path):
-        deck.take(keyword, options, lines)
+    for block in keyword_blocks(path):
+        deck.take(block)
     return deck.mesh()
 
 
-def files_of(path: Path) -> list[Path]:
-    """The file and all that it includes, in their order; those that are missing as well."""
-    found, waiting = [], [path]
-    while waiting:
-        found.append(waiting.pop(0))
-        try:
-            text = found[-1].read_text(errors="replace")
-        except OSError:
-            continue
-        named = [found[-1].parent / name for name in _INCLUDED.findall(text)]
-        waiting += [file for file in named if file not in found and file not in waiting]
-    return found
-
-
-_INCLUDED = re.compile(
-    r'^[ \t]*\*include[ \t]*,[ \t]*input[ \t]*=[ \t]*"?(.*?)"?[ \t]*$', re.IGNORECASE | re.MULTILINE
-)
-_Options = dict[str, str]
-_Lines = list[list[str]]
 # A cell or face: its number (0 for a face of a surface), its nodes, the names of its groups.
 _Row = tuple[int, list[int], set[str]]
 
 
-def _keywords(path: Path) -> Iterator[tuple[str, _Options, _Lines]]:
-    """Each keyword line with its options and the data lines below it, includes followed."""
-    block: tuple[str, _Options, _Lines] | None = None
-    for line in path.read_text(errors="replace").splitlines():
-        text = line.strip()
-        if not text or text.startswith("**"):
-            continue
-        if not text.startswith("*"):
-            if block:
-                block[2].append([field.strip() for field in text.split(",")])
-            continue
-        if block:
-            yield block
-        head, *rest = text[1:].split(",")
-        pairs = [part.partition("=") for part in rest]
-        options = {key.strip().upper(): value.strip().strip('"') for key, _, value in pairs}
-        block = (head.strip().upper(), options, [])
-        if block[0] == "INCLUDE":
-            yield from _keywords(path.parent / options.get("INPUT", ""))
-            block = None
-    if block:
-        yield block
+@dataclass
+class _Set:
+    """Numbers given one by one, with the line that gives them, and ranges, of which some exist."""
+
+    numbers: dict[int, str] = field(default_factory=dict)
+    ranges: dict[range, None] = field(default_factory=dict)
+
+    def add(self, other: "_Set") -> None:
+        self.numbers |= other.numbers
+        self.ranges |= other.ranges
+
+    def among(self, known: Collection[int]) -> set[int]:
+        """The members that are among the known numbers."""
+        found = {n for n in self.numbers if n in known}
+        for run in self.ranges:
+            few, many = (run, known) if len(run) < len(known) else (known, run)
+            found.update(n for n in few if n in many)
+        return found
 
 
 class _Deck:
@@ -103,65 +83,78 @@ class _Deck:
         self.path = path
         self.nodes: dict[int, list[float]] = {}
         self.cells: dict[int, tuple[CellType, list[int]]] = {}
-        self.cell_sets: dict[str, list[int]] = defaultdict(list)
-        self.node_sets: dict[str, list[int]] = defaultdict(list)
-        self.surfaces: dict[str, _Lines] = {}
+        self.cell_sets: dict[str, _Set] = defaultdict(_Set)
+        self.node_sets: dict[str, _Set] = defaultdict(_Set)
+        self.surfaces: dict[str, Block] = {}
+        self.sections: list[Block] = []
+        self.beams: Block | None = None
         self.spelling: dict[str, str] = {}
         self.seen: set[str] = set()
 
-    def _refuse(self, key: str, value: object, allowed: str) -> InputError:
-        return InputError(self.path, key, value, allowed)
+    @property
+    def dim(self) -> int:
+        """The dimension of the cells that make the bodies."""
+        return max((cell.dim for cell, _ in self.cells.values()), default=0)
 
-    def take(self, keyword: str, options: _Options, lines: _Lines) -> None:
-        if keyword in _REFUSED:
-            raise self._refuse(f"*{keyword}", None, "not followed: write out the mesh")
-        if keyword in ("PART", "INSTANCE"):
-            if keyword in self.seen or lines:
-                allowed = "allowed: one part and one instance, not moved"
-                raise self._refuse(f"*{keyword}", None, allowed)
-            self.seen.add(keyword)
-        elif keyword == "NODE":
-            self._take_nodes(options, lines)
-        elif keyword == "ELEMENT":
-            self._take_cells(options, lines)
-        elif keyword in ("NSET", "ELSET"):
-            sets = self.node_sets if keyword == "NSET" else self.cell_sets
-            self._take_set(sets, options[keyword], "GENERATE" in options, lines)
-        elif keyword == "SURFACE" and options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
-            self.surfaces[self._key(options["NAME"])] = lines
+    def take(self, block: Block) -> None:
+        if block.keyword in ("PART", "INSTANCE"):
+            if block.keyword in self.seen or block.lines:
+                raise block.refusal("allowed: one part and one instance, not moved")
+            self.seen.add(block.keyword)
+        elif block.keyword == "NODE":
+            self._take_nodes(block)
+        elif block.keyword == "ELEMENT":
+            self._take_cells(block)
+        elif block.keyword == "ELSET":
+            self._take_set(self.cell_sets, block, block.options["ELSET"])
+        elif block.keyword == "NSET":
+            self._take_set(self.node_sets, block, block.options["NSET"])
+        elif block.keyword == "SURFACE":
+            self._take_surface(block)
+        elif block.keyword.endswith("SECTION") and "ELSET" in block.options:
+            self.sections.append(block)
 
     def _key(self, name: str) -> str:
         self.spelling.setdefault(name.upper(), name)
         return name.upper()
 
-    def _take_nodes(self, options: _Options, lines: _Lines) -> None:
-        for number, *place in lines:
-            if int(number) in self.nodes:
-                raise self._refuse("*NODE", int(number), "two nodes have this number")
-            self.nodes[int(number)] = ([float(x) for x in place[:3] if x] + [0.0] * 3)[:3]
-        if "NSET" in options:
-            self.node_sets[self._key(options["NSET"])] += [int(line[0]) for line in lines]
+    def _take_nodes(self, block: Block) -> None:
+        members = _Set()
+        for line in block.lines:
+            n = number(line, 0)
+            if n in self.nodes:
+                raise line.refusal("*NODE", n, "two nodes have this number")
+            self.nodes[n] = place(line, block.options.get("SYSTEM", "R").upper(), block)
+            members.numbers[n] = line.where
+        if "NSET" in block.options:
+            self.node_sets[self._key(block.options["NSET"])].add(members)
 
-    def _take_cells(self, options: _Options, lines: _Lines) -> None:
-        kind = options.get("TYPE", "")
-        cell = self._cell_type(kind.upper())
-        flat = [int(field) for line in lines for field in line if field]
-        if len(flat) % (cell.n_nodes + 1):
-            raise self._refuse("*ELEMENT", None, f"each {kind} must have {cell.n_nodes} nodes")
-        table = np.array(flat).reshape(-1, cell.n_nodes + 1)
-        if cell.name == "SEG3":
-            table[:, 1:] = table[:, 1:][:, _MIDDLE_SECOND]
-        for number, *nodes in table.tolist():
-            missing = next((n for n in nodes if n not in self.nodes), None)
+    def _take_cells(self, block: Block) -> None:
+        kind = block.options["TYPE"]
+        cell = self._cell_type(block, kind.upper())
+        if kind.upper().startswith("B"):
+            self.beams = block
+        flat = [(line, i) for line in block.lines for i in range(len(line.fields))]
+        size = cell.n_nodes + 1
+        if len(flat) % size:
+            raise block.refusal(f"each {kind} must have {cell.n_nodes} nodes")
+        numbers = [number(line, i) for line, i in flat]
+        members = _Set()
+        for start in range(0, len(flat), size):
+            line, n, nodes = flat[start][0], numbers[start], numbers[start + 1 : start + size]
+            if cell.name == "SEG3":
+                nodes = [nodes[i] for i in _MIDDLE_SECOND]
+            missing = next((i for i in nodes if i not in self.nodes), None)
             if missing is not None:
-                raise self._refuse("node", missing, f"cell {number} has it, *NODE has not")
-            if number in self.cells:
-                raise self._refuse("*ELEMENT", number, "two cells have this number")
-            self.cells[number] = (cell, nodes)
-        if "ELSET" in options:
-            self.cell_sets[self._key(options["ELSET"])] += table[:, 0].tolist()
+                raise line.refusal("node", missing, f"cell {n} has it, *NODE has not")
+            if n in self.cells:
+                raise line.refusal("*ELEMENT", n, "two cells have this number")
+            self.cells[n] = (cell, nodes)
+            members.numbers[n] = line.where
+        if "ELSET" in block.options:
+            self.cell_sets[self._key(block.options["ELSET"])].add(members)
 
-    def _cell_type(self, name: str) -> CellType:
+    def _cell_type(self, block: Block, name: str) -> CellType:
         plane = _PLANE.match(name)
         found = _LINES.get(name.removesuffix("H"))
         if solid := re.match(r"C3D(\d+)", name):
@@ -170,37 +163,56 @@ class _Deck:
             found = _SURFACES.get(int(plane[1]))
         if found is None:
             allowed = "C3D4, C3D5, C3D6, C3D8, C3D10, C3D15, C3D20, CPE3, CPE4, CPE6, CPE8 and kin"
-            raise self._refuse("*ELEMENT, TYPE", name, f"allowed: {allowed}")
+            raise InputError(block.where, "*ELEMENT, TYPE", name, f"allowed: {allowed}")
         return BY_NAME[found]
 
-    def _take_set(
-        self, sets: dict[str, list[int]], name: str, generate: bool, lines: _Lines
-    ) -> None:
+    def _take_set(self, sets: dict[str, _Set], block: Block, name: str) -> None:
         members = sets[self._key(name)]
-        for line in lines:
-            fields = [field for field in line if field]
-            if generate:
-                first, last, *step = map(int, fields)
-                members += range(first, last + 1, *step)
+        for line in block.lines:
+            if "GENERATE" in block.options:
+                first, last = (number(line, i) for i in (0, 1))
+                step = number(line, 2) if len(line.fields) > 2 else 1
+                if not step or (last - first) % step or (last - first) // step < 0:
+                    allowed = "the increment must lead from the first number to the last"
+                    raise line.refusal(f"set {name}", step, allowed)
+                members.ranges[range(first, last + (1 if step > 0 else -1), step)] = None
                 continue
-            for field in fields:
-                if not field.isdigit() and field.upper() not in sets:
-                    raise self._refuse(f"set {name}", field, "no such set above it")
-                members += [int(field)] if field.isdigit() else sets[field.upper()]
+            for i, entry in enumerate(line.fields):
+                if entry.upper() in sets:
+                    members.add(sets[entry.upper()])
+                elif entry.lstrip("+-").isdigit() or not entry:
+                    members.numbers[number(line, i)] = line.where
+                else:
+                    raise line.refusal(f"set {name}", entry, "no such set above it")
+
+    def _take_surface(self, block: Block) -> None:
+        name, kind = block.options["NAME"], block.options.get("TYPE", "ELEMENT").upper()
+        if name.upper() in self.surfaces:
+            raise block.refusal(f"two surfaces have the name {name}")
+        if kind == "NODE":
+            lines = [replace(line, fields=line.fields[:1]) for line in block.lines]
+            self._take_set(self.node_sets, replace(block, lines=lines), name)
+        elif kind == "ELEMENT":
+            self.surfaces[self._key(name)] = block
+        else:
+            raise block.refusal(f"TYPE {kind}: allowed: ELEMENT, NODE")
 
     def mesh(self) -> meshio.Mesh:
         """The mesh: cells of a type in one block, the faces of surfaces after them."""
         names: dict[int, set[str]] = defaultdict(set)
         for name, members in self.cell_sets.items():
-            for number in members:
-                names[number].add(name)
+            self._refuse_strangers(name, members, self.cells, "cell")
+            for n in members.among(self.cells):
+                names[n].add(name)
+        nodes_of = self._node_sets()
+        self._refuse_structures()
         rows: dict[CellType, list[_Row]] = defaultdict(list)
-        for number, (cell, nodes) in self.cells.items():
-            rows[cell].append((number, nodes, names[number]))
-        for name, lines in self.surfaces.items():
-            for cell, nodes in self._faces(name, lines):
+        for n, (cell, nodes) in self.cells.items():
+            rows[cell].append((n, nodes, names[n]))
+        for name, block in self.surfaces.items():
+            for cell, nodes in self._faces(name, block):
                 rows[cell].append((0, nodes, {name}))
-        rank = {number: i for i, number in enumerate(self.nodes)}
+        rank = {n: i for i, n in enumerate(self.nodes)}
         return meshio.Mesh(
             np.array(list(self.nodes.values())).reshape(-1, 3),
             [
@@ -215,31 +227,62 @@ class _Deck:
                 for name in {**self.cell_sets, **self.surfaces}
             },
             point_sets={
-                self.spelling[name]: np.array([rank[n] for n in members if n in rank], np.int64)
-                for name, members in self.node_sets.items()
+                self.spelling[name]: np.array(sorted(rank[n] for n in members), np.int64)
+                for name, members in nodes_of.items()
             },
         )
 
-    def _faces(self, name: str, lines: _Lines) -> Iterator[tuple[CellType, list[int]]]:
-        """The faces of a surface, whose lines hold a cell, or a set of them, and a face."""
-        for owner, *label in lines:
-            if not owner.isdigit() and owner.upper() not in self.cell_sets:
-                raise self._refuse(f"surface {self.spelling[name]}", owner, "no such set of cells")
-            numbers = [int(owner)] if owner.isdigit() else self.cell_sets[owner.upper()]
-            for number in numbers:
-                if number not in self.cells:
-                    raise self._refuse(f"surface {self.spelling[name]}", number, "no such cell")
-                yield self._face(*self.cells[number], label[0].upper() if label else "")
+    def _node_sets(self) -> dict[str, set[int]]:
+        """The nodes of each set."""
+        found = {}
+        for name, members in self.node_sets.items():
+            self._refuse_strangers(name, members, self.nodes, "node")
+            found[name] = members.among(self.nodes)
+        return found
 
-    def _face(self, cell: CellType, nodes: list[int], label: str) -> tuple[CellType, list[int]]:
-        corners = FACES[cell.shape]
-        number = int(label[1:]) if re.fullmatch(r"S\d", label) else 0
-        if not 0 < number <= len(corners):
-            # Without a number, or as SPOS and SNEG: the shell itself is the face.
-            return cell, nodes
-        wanted = {int(c) - 1 for c in corners[number - 1]}
-        face = next(f for f in cell.faces if wanted <= set(f.nodes))
-        return BY_NAME[face.type], [nodes[i] for i in face.nodes]
+    def _refuse_strangers(
+        self, name: str, members: _Set, known: dict[int, object], what: str
+    ) -> None:
+        for n, where in members.numbers.items():
+            if n not in known:
+                raise InputError(where, f"set {self.spelling[name]}", n, f"no such {what}")
+
+    def _refuse_structures(self) -> None:
+        """Refuse beams, trusses, shells and membranes that the deck makes part of the model."""
+        dim = self.dim
+        for block in self.sections:
+            members = self.cell_sets.get(block.options["ELSET"].upper(), _Set())
+            thin = [n for n in members.among(self.cells) if self.cells[n][0].dim < dim]
+            if thin:
+                raise block.refusal(f"cell {min(thin)} is a structure beside solids: remove it")
+        if self.beams and dim == 3:
+            raise self.beams.refusal(f"{self.beams.options['TYPE']}: beams beside solids")
+
+    def _faces(self, name: str, block: Block) -> Iterator[tuple[CellType, list[int]]]:
+        """The faces of a surface, whose lines hold a cell, or a set of them, and a face."""
+        key, dim = f"surface {self.spelling[name]}", self.dim
+        for line in block.lines:
+            owner, label = (*line.fields, "")[:2]
+            if owner.upper() in self.cell_sets:
+                numbers = sorted(self.cell_sets[owner.upper()].among(self.cells))
+            elif owner.isdigit():
+                numbers = [number(line, 0)]
+            else:
+                raise line.refusal(key, owner, "no such set of cells")
+            for n in numbers:
+                if n not in self.cells:
+                    raise line.refusal(key, n, "no such cell")
+                cell, nodes = self.cells[n]
+                corners = FACES.get(cell.shape, [])
+                if cell.dim < dim and label.upper() in _ITSELF:
+                    yield cell, nodes
+                    continue
+                if not re.fullmatch(rf"[Ss][1-{len(corners)}]", label):
+                    allowed = f"a face of {cell.name} is S1 to S{len(corners)}"
+                    raise line.refusal(key, label, allowed)
+                wanted = {int(c) - 1 for c in corners[int(label[1]) - 1]}
+                face = next(f for f in cell.faces if wanted <= set(f.nodes))
+                yield BY_NAME[face.type], [nodes[i] for i in face.nodes]
 
 
 _NAMES = {name: kind.abaqus for name, kind in BY_NAME.items() if kind.abaqus}

@@ -14,6 +14,7 @@ from sympy.abc import x, y, z
 from solver.lac.cells.catalogue import BY_MESHIO, BY_NAME
 from solver.lac.cells.shape import gauss_rule, shape_functions
 from solver.mesh import read_mesh
+from solver.mesh.files.deck_lines import files_of
 from solver.system.errors import InputError
 from tests.mesh.curved import Curved
 
@@ -62,7 +63,7 @@ two cubes
 *SURFACE, TYPE=ELEMENT, NAME=front
  100, S3
  201, S3
-*SURFACE, TYPE=NODE, NAME=ignored
+*SURFACE, TYPE=NODE, NAME=on nodes
  pins
 *STEP
 *STATIC
@@ -166,7 +167,42 @@ def test_mirrored_cells_are_turned(tmp_path):
     [
         ("C3D8R", "C3D27", "*ELEMENT, TYPE = 'C3D27': allowed: C3D4, C3D5"),
         ("C3D8R", "SPRINGA", "*ELEMENT, TYPE = 'SPRINGA': allowed: C3D4, C3D5"),
-        ("*HEADING", "*NGEN", "*NGEN: not followed: write out the mesh"),
+        ("*HEADING", "*NGEN", "*NGEN: not followed: the deck must be a mesh"),
+        ("*HEADING", "*Rigid  Body, REF NODE=1", "*RIGID BODY: not followed"),
+        ("*HEADING", "*TIE, NAME=t", "*TIE: not followed"),
+        ("*HEADING", "*EQUATION", "*EQUATION: not followed"),
+        ("*HEADING", "*MPC", "*MPC: not followed"),
+        ("*HEADING", "*IMPERFECTION, FILE=a", "*IMPERFECTION: not followed"),
+        ("*STATIC", "*MODEL CHANGE, REMOVE", "*MODEL CHANGE: not followed"),
+        ("*HEADING", "*CONTACT PAIR, ADJUST=0.1", "*CONTACT PAIR: option ADJUST would change"),
+        ("*Node, nset", "*Node, system=S, nset", "*NODE: SYSTEM S: allowed: R, C"),
+        ("*Node, nset", "*Node, input=a, nset", "*NODE: option INPUT is not followed"),
+        ("NSET=pins", "NSET=pins, ELSET=both", "*NSET: option ELSET is not followed"),
+        ("ELSET=range, GENERATE", "ELSET=range, GENERATE, file=a", "*ELSET: option FILE is not"),
+        ("*ELSET, ELSET=both", "*ELSET", "*ELSET: option ELSET is missing"),
+        ("200, 202, 2", "200, 202, 0", "set range = 0: the increment must lead"),
+        ("200, 202, 2", "202, 200, 1", "set range = 1: the increment must lead"),
+        ("200, 202, 2", "200, 203, 2", "set range = 2: the increment must lead"),
+        (" 99\n*NSET", " 98\n*NSET", "set pins = 98: no such node"),
+        ("lower, UPPER", "lower, 888", "set both = 888: no such cell"),
+        (" 2, 1., 0., 0.", " 2, 1., O., 0.", "field 3 = 'O.': must be a number"),
+        (" 2, 1., 0., 0.", " 2, 1., inf, 0.", "field 3 = 'inf': must be a number"),
+        (" 100, 1, 2, 3", " 100, 1, 2, 3.5", "field 4 = '3.5': must be a whole number"),
+        (" 100, 1, 2, 3", " 100, 1, , 3", "field 3 = '': must be a whole number"),
+        (" lower, S2", " lower, S7", "surface slave = 'S7': a face of HEXA8 is S1 to S6"),
+        (" lower, S2", " lower,", "surface slave = '': a face of HEXA8 is S1 to S6"),
+        ("** a comment", "1, 2", "data = '1, 2': stands under no keyword"),
+        ("*END STEP", "*END STEP,", "keyword = '*END STEP,': does not end"),
+        ("*HEADING", "*INCLUDE, INPUT=deck.inp", "*INCLUDE: "),
+        ("*HEADING", "*INCLUDE, INPUT=/dev/zero", "*INCLUDE: /dev/zero: no such file"),
+        ("*HEADING", "*INCLUDE", "*INCLUDE: "),
+        ("NAME=front", "NAME=slave", "*SURFACE: two surfaces have the name slave"),
+        ("*STEP", "*ELEMENT, TYPE=B31\n7, 1, 2\n*STEP", "*ELEMENT: B31: beams beside solids"),
+        (
+            "*STEP",
+            "*ELEMENT, TYPE=T3D2, ELSET=rod\n7, 1, 2\n*SOLID SECTION, ELSET=rod\n*STEP",
+            "*SOLID SECTION: cell 7 is a structure beside solids",
+        ),
         ("lower, UPPER", "lower, middle", "set both = 'middle': no such set above it"),
         ("*HEADING", "*INSTANCE\n*INSTANCE", "*INSTANCE: allowed: one part and one instance"),
         (" 5, 0., 0., 1.\n", "", "node = 5: cell 100 has it, *NODE has not"),
@@ -176,21 +212,89 @@ def test_mirrored_cells_are_turned(tmp_path):
         (" 99, 7., 7., 7.\n", " 5, 7., 7., 7.\n", "*NODE = 5: two nodes have this number"),
         (" 202, 11, 13", " 100, 11, 13", "*ELEMENT = 100: two cells have this number"),
         (" 202, 11, 13", " 201, 11, 13", "*ELEMENT = 201: two cells have this number"),
-        ("*INCLUDE, INPUT=none.inp", "", ""),
-    ],
+        ],
 )
 def test_refusals(old, new, message, tmp_path):
-    text = DECK.replace(old, new) if message else old
+    assert old in DECK
     with pytest.raises(InputError) as caught:
-        read(tmp_path, text)
-    assert str(caught.value).startswith(f"{tmp_path / 'deck.inp'}: {message}")
-    assert "\n" not in str(caught.value)
+        read(tmp_path, DECK.replace(old, new))
+    file, _, line = str(tmp_path / "deck.inp"), *str(caught.value).split(", line ", 1)
+    assert str(caught.value).startswith(f"{file}, line ")
+    row, _, said = line.partition(": ")
+    assert said.startswith(message)
+    assert "\n" not in said
+    assert 0 < int(row) <= len(DECK.splitlines()) + 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("** a comment", "\ufeff*HEADING"),
+        (" 2, 1., 0., 0.", " 2, 1.0D+0, 0.d0, -0E1"),
+        (" 2, 1., 0., 0.", " 2, 1., ,"),
+        (" 4, 0., 1., 0.", " 4, , 1."),
+        ("*ELEMENT, TYPE=C3D8R, ELSET=lower", "*ELEMENT, TYPE=C3D8R,\n\n ELSET=lower"),
+        ("*NSET, NSET=pins", "*NSET,\n** comment\nNSET=pins"),
+        ("200, 202, 2", "202, 200, -2"),
+        ("200, 202, 2", "202, 202"),
+        ("*SURFACE, TYPE=ELEMENT, NAME=slave\n lower, S2", "*SURFACE, NAME=slave\n \"lower\", s2"),
+        (" pins, 5", ' "PINS" , 5,'),
+        ("*ELSET, ELSET=both\n lower, UPPER", '*ELSET, ELSET="both"\n "lower", "UPPER"'),
+        ("*STATIC", "*VISCO\n1., 1."),
+        ("*HEADING", "*CONTACT PAIR, INTERACTION=i\na, b\n*HEADING"),
+    ],
+)
+def test_the_same_deck_in_other_words(old, new, tmp_path):
+    assert old in DECK
+    mesh, expected = (read(tmp_path, text) for text in (DECK.replace(old, new), DECK))
+    np.testing.assert_array_equal(mesh.points, expected.points)
+    for one, other in zip(mesh.cells, expected.cells, strict=True):
+        np.testing.assert_array_equal(one.data, other.data)
+    assert groups(mesh) == groups(expected)
+
+
+def groups(mesh: meshio.Mesh) -> dict[str, list]:
+    """The members of all groups, by block for cells."""
+    of_cells = {name: [ids.tolist() for ids in sets] for name, sets in mesh.cell_sets.items()}
+    return of_cells | {name: ids.tolist() for name, ids in mesh.point_sets.items()}
+
+
+def test_surfaces_of_nodes_are_groups_of_nodes(tmp_path):
+    nodes = groups(read(tmp_path, DECK))
+    assert nodes["on nodes"] == nodes["pins"] == [0, 1]
+
+
+def test_cylindrical_coordinates(tmp_path):
+    """Radius, angle in degrees, z."""
+    text = "*NODE, SYSTEM=C\n1, 1\n2, 2., 360\n3, 2., 90.\n4, 1., -2.7D2\n"
+    mesh = read(tmp_path, text + "*ELEMENT, TYPE=CPE4, ELSET=body\n1, 1, 2, 3, 4\n")
+    expected = [[1, 0], [2, 0], [0, 2], [0, 1]]
+    np.testing.assert_allclose(mesh.points, expected, atol=1e-15)
+
+
+def test_includes_start_from_the_folder_of_the_job(tmp_path):
+    (tmp_path / "sub").mkdir()
+    nodes, _, rest = DECK.partition("*ELEMENT")
+    (tmp_path / "sub/all.inp").write_text("*INCLUDE, INPUT=sub/nodes.inp\n*include, input=more.inp")
+    (tmp_path / "sub/nodes.inp").write_text(nodes)
+    (tmp_path / "sub/more.inp").write_text("*ELEMENT" + rest)
+    mesh = read(tmp_path, "*INCLUDE, INPUT=sub/all.inp\n")
+    assert len(mesh.points) == 16
+    names = [str(f.relative_to(tmp_path)) for f in files_of(tmp_path / "deck.inp")]
+    assert names == ["deck.inp", "sub/all.inp", "sub/nodes.inp", "sub/more.inp"]
+
+
+def test_sets_of_sets_stay_as_large_as_the_mesh(tmp_path):
+    """Sixty sets, each of them twice the one before."""
+    deeper = "".join(f"*NSET, NSET=s{i + 1}\ns{i}, s{i}\n" for i in range(60))
+    runs = "*NSET, NSET=run, GENERATE\n1, 900000000000000000, 1\n"
+    nodes = groups(read(tmp_path, DECK.replace("*STEP", f"*NSET, NSET=s0\n1\n{deeper}{runs}*STEP")))
+    assert nodes["s60"] == [0]
+    assert len(nodes["run"]) == 16
 
 
 # Abaqus input as CalculiX understands it: volumes of curved cells, and the numbers of faces.
 
-
-pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 
 TYPES = {
     "TETRA4": "C3D4", "TETRA10": "C3D10", "PENTA6": "C3D6", "PENTA15": "C3D15",
@@ -256,6 +360,7 @@ def own_face(mesh: meshio.Mesh, group: str) -> np.ndarray:
     return np.array([*(share @ (values @ points) / area), *(weights @ normal / area), area])
 
 
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 @pytest.mark.parametrize("name", TYPES)
 def test_volumes_and_faces(name, tmp_path):
     deck, printed = run(name, tmp_path)
