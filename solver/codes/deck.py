@@ -13,7 +13,7 @@ from ..case.material import Material
 from ..case.model import Case
 from ..lac.cells.faces import FaceBlock, surface_nodes, surface_normals
 from ..lac.cut import cut
-from ..mechanics.fem.bodies import body_numbers
+from ..lac.motions import body_numbers
 from ..mechanics.fem.faces import volume_cells
 from ..mechanics.fem.supports import FreeMotion
 from ..simulation.scene.attributes import Attributes

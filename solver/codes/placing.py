@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..lac.cells.catalogue import BY_MESHIO
-from ..mechanics.fem.bodies import body_numbers
+from ..lac.motions import body_numbers
 from ..system.errors import InputError
 from .foreign import Field, ForeignResult
 from .model import Model

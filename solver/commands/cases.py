@@ -41,7 +41,7 @@ def run_new(options: argparse.Namespace) -> int:
 
 def add_validate(command: argparse.ArgumentParser) -> None:
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
-    command.add_argument("--mesh", action="store_true", help="also mesh them and check the groups")
+    command.add_argument("--mesh", action="store_true", help="also mesh them: groups, surfaces, supports")
 
 
 def run_validate(options: argparse.Namespace) -> int:
@@ -67,11 +67,14 @@ def _validate_one(path: Path, with_mesh: bool) -> None:
 
         read_recipe(case.mesh, path)
     if with_mesh:
-        from ..simulation.scene.groups import check_groups
-        from ..simulation.scene.selections import with_groups
+        from ..simulation.options import LEAN
+        from ..simulation.simulate import assembled
+        from ..system.progress import Clock
         from ..verification.run import mesh_of
 
-        check_groups(case, with_groups(case, mesh_of(case)))
+        mesh = mesh_of(case)
+        for swapped in (False, True)[: 1 + (case.directions == "both")]:
+            assembled(case.as_solved(swapped, None, None), mesh, LEAN, Clock())
 
 
 def add_mesh(command: argparse.ArgumentParser) -> None:

@@ -13,13 +13,23 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 import skfem
+from scipy import sparse
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
+from .arguments import (
+    Bodies,
+    check_boundary,
+    checked_search,
+    checked_stiffness,
+    checked_unknowns,
+    checked_vector,
+)
 from .cells.faces import surface_points
 from .errors import SolveError
 from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
+from .motions import smoothed, unheld_motion
 from .operator import gap_operator
 from .reconstruction import form_of, vertex_neighbours
 from .recovery import Recovery, RecoveryRequest, settled_means
@@ -36,7 +46,7 @@ _ROUND_OFF = 1e-10
 _PIVOT = 0.01
 # How often a status that the recovered pressure changes is found anew.
 _ROUNDS = 3
-_SINGULAR = "the system is singular: a body may move freely"
+_SINGULAR = "the system is singular"
 _SINGULAR_FROM = 1e14
 
 
@@ -147,6 +157,9 @@ class LocalAverageContact:
         gap: Gap | None = None,
         search: float | None = None,
     ):
+        check_boundary(slave, "slave")
+        check_boundary(master, "master")
+        search = checked_search(search)
         if normal not in ("element", "nodal", "master"):
             raise ValueError(f"normal = {normal!r}: must be element, nodal or master")
         if slave[0].dim() != master[0].dim():
@@ -172,6 +185,12 @@ class LocalAverageContact:
         self._unknown = np.zeros(0, dtype=int)
         operator = gap_operator(*self._surfaces)
         self._matrix = operator.matrix
+        near = vertex_neighbours([(whole.number, self._vertices)], count)
+        about = operator.surface.normal, operator.surface.area, near
+        self._smooth = smoothed(operator.matrix, *about) if normal == "element" else self._matrix
+        self._points, self._cells = points, {"slave": self.mesh.dofs.element_dofs.T}
+        if not self._whole:
+            self._cells["master"] = first + master[0].dofs.element_dofs.T
         self.area, self.covered = operator.area, operator.covered
         self._opposed = self.covered > _COVERED * self.area
         if not self._opposed.any():
@@ -182,8 +201,9 @@ class LocalAverageContact:
         """The integral (k,) of a given initial gap over the covered part of each facet."""
         faces = [(block.type.name, block.nodes, block.number) for block in slaves]
         at = surface_points(points, faces)
-        value = gap(at.place.T) if callable(gap) else np.full(len(at.weight), float(gap))
-        return np.asarray(at.means(np.asarray(value, dtype=float)) * self.covered)
+        value = gap(at.place.T) if callable(gap) else np.full(len(at.weight), gap)
+        value = checked_vector(value, len(at.weight), "gap")
+        return np.asarray(at.means(value) * self.covered)
 
     def matrix(self, slave_basis: Any, master_basis: Any) -> csr_matrix:
         """B, the derivative of the gap's integral on each facet.
@@ -214,7 +234,9 @@ class LocalAverageContact:
                 master = master + slave_basis.N
             unknown = np.hstack([slave, master]).T.ravel()
             size = max(slave_basis.N, int(unknown.max()) + 1)
-        self._unknown = unknown
+        self._unknown, points = unknown, self._points
+        on_slave = np.arange(len(points)) < self.mesh.p.shape[1]
+        self._bodies = Bodies(points, self._cells, unknown, on_slave, size)
         return _numbered(self._matrix, unknown, size)
 
     def solve(
@@ -224,17 +246,32 @@ class LocalAverageContact:
         B: csr_matrix,
         x: np.ndarray | None = None,
         D: np.ndarray | None = None,
+        springs: Any = None,
     ) -> ContactState:
         """Solve K u = f + Bᵀ p with u = x at the unknowns D, and find the contact status.
 
-        The arguments are those of `skfem.condense`, and B is that of `matrix`.
+        The arguments are those of `skfem.condense`, and B is that of `matrix`. K is the stiffness
+        of the bodies alone: it resists none of their rigid motions. `springs` is what the ground
+        adds to it.
 
         Raises:
         ------
+        ValueError
+            For arguments of the wrong shape or kind, and a K that does not fit B.
         RuntimeError
             Where a body may move freely, and where no status fulfils the conditions.
         """
-        system = _System(self, K.tocsr(), np.asarray(f, dtype=float), B, x, D)
+        shape = len(self.area), len(self._unknown)
+        if not sparse.issparse(B) or not shape[1] or B.shape[0] != shape[0]:
+            raise ValueError("B: must be the matrix that `matrix` returned")
+        size = B.shape[1]
+        stiffness = checked_stiffness(K, size)
+        self._bodies.check(stiffness)
+        ground = None if springs is None else checked_stiffness(springs, size, "springs")
+        imposed = np.zeros(size) if x is None else checked_vector(x, size, "x")
+        held = checked_unknowns(D, size)
+        force = checked_vector(f, size, "f")
+        system = _System(self, stiffness, force, B, imposed, held, ground)
         opposed = self._opposed
         found = find_status(system.trial, opposed, opposed, self.area, system.stiffness)
         return system.state(found.closed, found.iterations)
@@ -253,6 +290,8 @@ class LocalAverageContact:
         RuntimeError
             Where the contact status does not settle under the recovered pressure.
         """
+        if not isinstance(state, ContactState):
+            raise ValueError(f"state = {type(state).__name__}: must be a ContactState")
         if form not in get_args(Recovered):
             raise ValueError(f"form = {form!r}: must be {', '.join(get_args(Recovered))}")
         shape = form_of(form, self._order, self._vertices.shape[1])
@@ -293,15 +332,20 @@ class _System:
         stiffness: csr_matrix,
         force: np.ndarray,
         gaps: csr_matrix,
-        imposed: np.ndarray | None,
-        held: np.ndarray | None,
+        imposed: np.ndarray,
+        held: np.ndarray,
+        springs: csr_matrix | None,
     ):
         self.contact, self.size = contact, float(np.ptp(contact.mesh.p))
-        given = np.zeros(0, dtype=int) if held is None else np.asarray(held).ravel()
-        self.force, self.free = force, np.setdiff1d(np.arange(len(force)), given)
+        self.force, self.free = force, np.setdiff1d(np.arange(len(force)), held)
         self.imposed = np.zeros(len(force))
-        if imposed is not None:
-            self.imposed[given] = np.asarray(imposed, dtype=float)[given]
+        self.imposed[held] = imposed[held]
+        motions = contact._bodies.motions
+        at_held = [motions[held]]
+        if springs is not None:
+            at_held.append(springs / abs(springs).max() @ motions)
+            stiffness = stiffness + springs
+        self.supports = sum((rows.T @ rows).toarray() for rows in at_held)
         self.matrix = stiffness[self.free][:, self.free]
         self.gaps = gaps[:, self.free]
         self.load = (force - stiffness @ self.imposed)[self.free]
@@ -338,7 +382,22 @@ class _System:
             self.factored = key, self._new_factor(closed)
         return self.factored[1]
 
+    def _refuse_free_motion(self, closed: np.ndarray) -> None:
+        """SolveError where a body moves freely with these facets closed."""
+        contact, bodies = self.contact, self.contact._bodies
+        held, smooth = (
+            _numbered(rows, contact._unknown, len(self.force))[closed] @ bodies.motions
+            for rows in (contact._matrix, contact._smooth)
+        )
+        weight = sparse.diags(1 / contact.covered[closed])
+        found = unheld_motion(self.supports, weight @ held, bodies.count, weight @ smooth)
+        if found:
+            what = f"nothing keeps {bodies.names[found[0]]} from a free motion ({found[1]})"
+            count = int((~closed & contact._opposed).sum())
+            raise SolveError(f"{what}, with {count} facets open: a support is missing")
+
     def _new_factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
+        self._refuse_free_motion(closed)
         rows = self.scale * self.gaps[closed]
         system = bmat([[self.matrix, rows.T], [rows, None]], "csc")
         try:

@@ -61,7 +61,11 @@ class Tangent(NamedTuple):
 
 
 def tangents(normal: np.ndarray) -> list[Tangent]:
-    """The dim − 1 tangents of macro-elements with mean normals (m, dim)."""
+    """The dim − 1 tangents of macro-elements with mean normals (m, dim).
+
+    >>> [tangent.along.tolist() for tangent in tangents(np.array([[0.0, 1.0]]))]
+    [[[-1.0, 0.0]]]
+    """
     return [Tangent(normal, along) for along in np.swapaxes(tangents_of(normal), 0, 1)]
 
 

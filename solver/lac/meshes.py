@@ -126,7 +126,7 @@ def unknowns_at_nodes(basis: Any, mesh: skfem.Mesh, role: str) -> np.ndarray:
     the basis, and for one on another mesh.
     """
     name = mesh.elem.__name__
-    element = basis.elem
+    element = getattr(basis, "elem", basis)
     if not isinstance(element, skfem.ElementVector) or type(element.elem) is not mesh.elem:
         given = type(element).__name__
         text = f"{role}: basis of {given}; {type(mesh).__name__} needs ElementVector({name}())"

@@ -6,7 +6,7 @@ import pytest
 
 from solver.codes.foreign import Field, ForeignResult
 from solver.codes.verdicts import check_foreign
-from solver.mechanics.fem.bodies import body_numbers
+from solver.lac.motions import body_numbers
 from tests.codes import results
 
 

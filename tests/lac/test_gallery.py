@@ -21,7 +21,10 @@ def test_the_example_of_the_patch_test():
     assert run("ex01_patch")["state"].pressure == pytest.approx([25.0] * 6, rel=1e-12)
 
 
-def test_the_example_of_hertz():
+def test_the_example_of_hertz(capsys):
+    file = str(ROOT / "docs" / "examples" / "lac" / "ex02_hertz.py")
+    runpy.run_path(file, run_name="__main__")
+    assert capsys.readouterr().out.startswith("largest pressure 39.29, Hertz: 38.8")
     space = run("ex02_hertz")
     _, pressure, coarse = space["hertz"](6)
     _, finer, fine = space["hertz"](10)

@@ -75,6 +75,8 @@ def visualize(n=8):
 
 
 if __name__ == "__main__":
-    errors = {n: hertz(n)[2] for n in (6, 10)}
+    solved = {n: hertz(n) for n in (6, 10)}
+    errors = {n: error for n, (_, _, error) in solved.items()}
+    print(f"largest pressure {solved[10][1].max():.4g}, Hertz: {P0:.4g}")
     order = np.log(errors[6] / errors[10]) / np.log(10 / 6)
     print(f"relative error of the pressures {errors[6]:.3f}, {errors[10]:.3f}: order {order:.2f}")

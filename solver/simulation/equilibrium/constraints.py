@@ -12,13 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from ...case.acting import Step
+from ...lac.motions import motion_fields, smoothed, support_resistance, unheld_motion
 from ...lac.operator import without_round_off
-from ...mechanics.fem.bodies import (
-    motion_fields,
-    nodes_of_unknowns,
-    support_resistance,
-    unheld_motion,
-)
+from ...lac.reconstruction import vertex_neighbours
+from ...mechanics.fem.bodies import nodes_of_unknowns
 from ...mechanics.fem.elasticity import stiffness
 from ...mechanics.linear.choice import against_multigrid
 from ...mechanics.linear.condensation import choose_pivots
@@ -33,6 +30,8 @@ from ..scene.scene import Scene, ZoneScene
 MIN_COVERAGE = 0.01
 # Multipliers whose coefficients on free unknowns are below this share of all are inactive.
 _ACTIVE = 1e-12
+# Normals that differ by less are those of flat surfaces.
+_BENT = 1e-9
 # Coverage above one by more than this means that the master surface lies there twice.
 _TWICE = 1e-6
 
@@ -135,13 +134,15 @@ class RigidMotions:
     """The r rigid motions of all bodies, by what resists them.
 
     `supports` (r, r): see `support_resistance`; `springs` (s, r) and `opened` (k, r): what each
-    motion changes in the rows of `unit_springs`, and the average gap that it opens. The motions
-    themselves take as much memory as several displacements.
+    motion changes in the rows of `unit_springs`, and the average gap that it opens; `smooth` (k, r)
+    the same along smooth normals, where these differ. The motions themselves take as much memory as
+    several displacements.
     """
 
     supports: np.ndarray
     springs: sparse.csr_matrix
     opened: sparse.csr_matrix
+    smooth: sparse.csr_matrix | None
 
     @classmethod
     def of(
@@ -151,14 +152,39 @@ class RigidMotions:
         covered = constraints.covered
         weight = np.divide(1.0, covered, out=np.zeros(len(covered)), where=covered > 0)
         supports = support_resistance(motions, scene.free.basis)
-        opened = (sparse.diags(weight) @ constraints.gaps).tocsr() @ motions
-        return cls(supports, unit_springs(scene.springs) @ motions, opened)
+        per_area = sparse.diags(weight)
+        smooth = _smooth_gaps(scene)
+        return cls(
+            supports,
+            unit_springs(scene.springs) @ motions,
+            (per_area @ constraints.gaps).tocsr() @ motions,
+            None if smooth is None else (per_area @ smooth).tocsr() @ motions,
+        )
+
+
+def _smooth_gaps(scene: Scene) -> sparse.csr_matrix | None:
+    """The rows of all zones along smooth normals; None where these are those of the faces."""
+    rows, bent = [], False
+    for zone in scene.zones:
+        operator, surface = zone.operator, zone.operator.surface
+        rows.append(operator.matrix)
+        if zone.zone.normal != "element" or operator.nodes is not None or scene.space < 3:
+            continue
+        faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in zone.slave_faces]
+        near = vertex_neighbours(faces, zone.count)
+        rows[-1] = smoothed(operator.matrix, surface.normal, surface.area, near)
+        bent = bent or abs(rows[-1] - operator.matrix).max() > _BENT * abs(operator.matrix).max()
+    slips = [row for zone in scene.zones for row in zone.operator.slip]
+    return sparse.vstack([*rows, *slips]).tocsr() if bent else None
 
 
 def free_motion(scene: Scene, motions: RigidMotions, closed: np.ndarray) -> str:
     """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free."""
-    held = sparse.vstack([motions.opened[closed], motions.springs]).tocsr()
-    found = unheld_motion(motions.supports, held, scene.n_bodies)
+    held, smooth = (
+        None if rows is None else sparse.vstack([rows[closed], motions.springs]).tocsr()
+        for rows in (motions.opened, motions.smooth)
+    )
+    found = unheld_motion(motions.supports, held, scene.n_bodies, smooth)
     if found is None:
         return ""
     return f"nothing keeps {body_names(scene)[found[0]]} from a free motion ({found[1]})"

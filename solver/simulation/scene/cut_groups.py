@@ -22,7 +22,7 @@ from ...case.model import Case
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces
-from ...mechanics.fem.bodies import body_numbers
+from ...lac.motions import body_numbers
 from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
 from ...mechanics.fem.loads import Field, at_nodes, foundation
 from ...mechanics.fem.supports import Copies

@@ -10,7 +10,7 @@ from solver.lac.facets import facets
 from solver.lac.operator import gap_operator
 from solver.lac.reconstruction import FORMS, vertex_neighbours
 from solver.lac.recovery import RecoveryRequest
-from solver.mechanics.fem.bodies import rigid_motions, support_resistance, unheld_motion
+from solver.lac.motions import rigid_motions, support_resistance, unheld_motion
 from solver.mechanics.fem.elasticity import (
     Block,
     internal_force,
