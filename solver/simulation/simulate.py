@@ -18,7 +18,8 @@ from .equilibrium.problem import ContactProblem
 from .equilibrium.recovery import Recovered, recovered
 from .equilibrium.state import Equilibrium
 from .judgement.consistency import inconsistency
-from .judgement.plan import decided, estimated, plan_notes, remarks, softness_notes, validity
+from .judgement.plan import decided, estimated, plan_notes, softness_notes
+from .judgement.validity import remarks, validity
 from .options import LEAN, Options
 from .results.results import solution_of
 from .results.solution import Solution
@@ -80,7 +81,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
         solution = solution_of(problem, states, fields, plan)
-        solution.validity = validity(scene, states)
+        solution.validity = validity(problem, states)
     _log_forces(solution)
     solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..case.model import job_name
 from ..simulation.equilibrium.state import Accuracy
-from ..simulation.judgement.plan import limits_passed
-from .scatter import oscillating
+from ..simulation.judgement.validity import broken_by_facets, limits_passed
+from .scatter import unresolved
 from .units import derived
 from .verdict import (
     EXACT,
@@ -84,11 +84,11 @@ def judge(
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
     relative error that rounding alone may cause, is the first reason), where the solve is beyond
-    what linear theory takes for granted, or where the pressure oscillates. `result` is the name of
+    what linear theory takes for granted, or where its mesh does not resolve the pressure. `result` is the name of
     the result file beside the verdict and `sha256` its hash.
     """
-    accuracy = Accuracy(solution.accuracy)
-    unreliable = [reason for reason in (accuracy.reason, oscillating(solution)) if reason]
+    accuracy, scatters = Accuracy(solution.accuracy), unresolved(solution)
+    unreliable = [reason for reason in (accuracy.reason, scatters) if reason]
     unreliable += limits_passed(solution.case, solution.validity)
     reasons = unreliable + [check.reason for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
@@ -108,6 +108,7 @@ def judge(
         result_sha256=sha256,
         **{name: getattr(solution, name) for name in _OF_SOLUTION},
         **asdict(solution.validity),
+        pressure_within=None if scatters else _pressure_within(solution),
         seconds={**seconds, "total": seconds.get("total", sum(seconds.values()))},
         pressure=_extremes(zone.multiplier for zone in zones),
         stress=_extremes([solution.nodal_normal_stress[solution.body >= 0]]),
@@ -127,6 +128,17 @@ def judge(
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),
     )
+
+
+def _pressure_within(solution: Solution) -> float | None:
+    """The estimated relative error of the constant pressures, by the mesh and by its facets.
+
+    None where facets break the pressure, and for multipliers at nodes, which have no estimate.
+    """
+    estimate, found = solution.pressure_error_estimate, solution.validity
+    if estimate is None or broken_by_facets(solution.case, found):
+        return None
+    return math.hypot(estimate, found.facets)
 
 
 def without_result(

@@ -35,8 +35,8 @@ NUMBERS = (
 """The checks of single numbers."""
 T = TypeVar("T")
 _DIGEST = "digest"
-# An estimate of the pressure's error below this one is not worth a word.
-_NEGLIGIBLE = 1e-10
+# A share of less than a thousandth of a percent.
+_NEGLIGIBLE = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +148,18 @@ class CheckError:
     error: float = math.nan
 
 
+def percent(share: float) -> str:
+    """A share in percent, two digits of it.
+
+    >>> percent(0.0412), percent(1e-9), percent(3.2)
+    ('4.1 %', 'below 0.001 %', '320 %')
+    """
+    if share < _NEGLIGIBLE:
+        return "below 0.001 %"
+    digits = max(0, 1 - int(np.floor(np.log10(100 * share))))
+    return f"{100 * share:.{digits}f} %" if share < 1 else f"{float(f'{100 * share:.2g}'):.0f} %"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sides:
     """A contact zone as it was solved: its slave and master groups."""
@@ -179,8 +191,9 @@ class Verdict:
     `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
     and maximum over all zones; `seconds` has wall times by stage and their `total`.
     `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
-    reconstruction. `units` names the units of length, stress, area, force, moment and energy where
-    the case does. `strain` to `unpaired`: see `solver.simulation.results.solution.Validity`.
+    reconstruction; `pressure_within` has the change by facets too, and is None where the pressure
+    is broken and nothing can be said. `units` names the units of length, stress, area, force, moment and energy where
+    the case does. `strain` to `facet_depth`: see `solver.simulation.results.solution.Validity`.
     `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
     succeed another time.
 
@@ -227,6 +240,9 @@ class Verdict:
     pushed_past: int | None = None
     partly_covered: int | None = None
     unpaired: float | None = None
+    facets: float | None = None
+    facet_depth: float | None = None
+    pressure_within: float | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None
@@ -276,7 +292,7 @@ class Verdict:
         line = f"{self.job}: {self.verdict}"
         line += f" ({', '.join(self.only)} only)" if self.only else ""
         if self.reason:
-            return f"{line}: {self.reason}"
+            return f"{line}: {self.reason}{self.estimate}"
         error = (
             f", largest checked error {self.worst.error:.1e} ({self.worst.name})"
             if self.worst
@@ -286,11 +302,19 @@ class Verdict:
         worst = next((c for c in self.checks if self.worst and c.name == self.worst.name), None)
         if worst and worst.expected:
             error += f", expected {worst.expected:.1e}"
-        if (self.pressure_error_estimate or 0.0) > _NEGLIGIBLE:
-            error += f", constant pressures within {self.pressure_error_estimate:.1e} (estimated)"
+        error += self.estimate
         missing = f", not given: {', '.join(self.not_given)}" if self.not_given else ""
         time = f", {self.seconds['total']:.2f} s" if "total" in self.seconds else ""
         return f"{line}{error}{missing}{time}"
+
+    @property
+    def estimate(self) -> str:
+        """The estimated error of the pressure, for the end of a line; empty without a result."""
+        if not self.pressure or not self.zones or self.code:
+            return ""
+        if self.pressure_within is None:
+            return "; estimated error of the pressure: none can be given"
+        return f"; estimated error of the pressure: {percent(self.pressure_within)}"
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""

@@ -219,9 +219,7 @@ def test_pages_show_counts_beside_the_reference_and_say_which_sign(report):
 
 def test_pages_show_the_estimated_error(report):
     folder, _ = report
-    assert (
-        "estimated L2 error of the constant pressures 1.2e-02." in (folder / "fam.html").read_text()
-    )
+    assert "estimated error of the pressure: 1.2 %." in (folder / "fam.html").read_text()
 
 
 def test_pages_list_the_forces_of_each_step_and_the_probes(tmp_path):

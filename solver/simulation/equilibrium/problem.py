@@ -225,6 +225,14 @@ class ContactProblem:
         found[closed] = system.multiplier(pushed - self.matrix @ change)
         return found
 
+    def pressure_of_gaps(self, closed: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """The change of pressure (k,) by average gaps (k,), with the `closed` (k,) kept closed."""
+        system, found = self._systems.closed(closed), np.zeros(len(closed))
+        imposed = (self.constraints.covered * gaps)[closed]
+        change = system.correction(np.zeros(self.matrix.shape[0]), imposed, _CHANGE)
+        found[closed] = system.multiplier(-(self.matrix @ change))
+        return found
+
     def _free_motion(self, closed: np.ndarray) -> str:
         """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
         key = closed.tobytes()

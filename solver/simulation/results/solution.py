@@ -187,7 +187,9 @@ class Validity:
     `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
     contact, a mean over the macro-element, by its size; `pushed_past`: how many cells are inside
     another body; `partly_covered`: how many closed macro-elements are under the master's end;
-    `unpaired`: the largest share of one, closed or bare, opposite the master but in no segment.
+    `unpaired`: the largest share of one, closed or bare, opposite the master but in no segment;
+    `facets`, `facet_depth`: what facets of curved surfaces do in the last step, as the share of the
+    pressure that they change and their depth by the elastic closing of the contact.
     """
 
     strain: float = float("nan")
@@ -196,6 +198,8 @@ class Validity:
     pushed_past: int = 0
     partly_covered: int = 0
     unpaired: float = 0.0
+    facets: float = 0.0
+    facet_depth: float = 0.0
 
 
 @dataclass

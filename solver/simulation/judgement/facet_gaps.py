@@ -1,0 +1,142 @@
+"""What the facets of curved surfaces do to a pressure: gaps and overlaps that are none.
+
+Linear faces lie inside a convex surface and outside a concave one, up to the sagitta. Where the
+gap of bodies is taken from the mesh, it is wrong by what the facets of both sides miss, and contact
+presses it out. How much a face misses is seen at its vertices: with κ the curvature, the mean
+normal there leans by κ (x − c) against the face's own, and the surface is κ/2 (R² − |x − c|²) above
+the face at x, c its middle and R the distance of the vertices. The pressure that this brings up is
+found with the factor of the solve, the status kept. Quadratic faces follow their surface: their
+vertices have one normal.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from ...lac.cells.faces import FaceBlock, area_vectors, surface_normals
+from ...lac.cells.shape import shape_functions
+from ...lac.reconstruction import vertex_neighbours
+from ..equilibrium.problem import ContactProblem
+from ..equilibrium.state import Equilibrium
+from ..results.balance import strain_energy
+from ..scene.scene import Scene, ZoneScene
+
+# A vertex whose mean normal leans by more against a face's own is on an edge of the body.
+_EDGE = np.cos(np.radians(25))
+# Gaps of mesh and case agree where they differ by less than this share of what facets may miss.
+_FITS = 1e-3
+# The mean over a face of what it misses, over κ R² / 2 with the κ seen at its vertices, by order:
+# 1 − |x − c|² / R² for linear lines and quadrangles (3/4 on triangles), (1 − r²) r² / 2 for arcs.
+_MEAN = {1: 2 / 3, 2: 2 / 15}
+
+
+class _Bend(NamedTuple):
+    """By face (f,): its middle (f, dim), and the mean rise of the surface above the face."""
+
+    middle: np.ndarray
+    rise: np.ndarray
+
+
+class Facets(NamedTuple):
+    """What facets do, the most of all zones; zero without any.
+
+    `pressure`: the L2 change of a zone's pressure by the gap that facets add on the average, over
+    the pressure; `depth`: how far facets miss their surfaces, over the elastic closing of the
+    contact, or over the smallest gap that is left where nothing touches.
+    """
+
+    pressure: float
+    depth: float
+
+
+def facets_of(problem: ContactProblem, state: Equilibrium) -> Facets:
+    """What facets do to a state, its status kept.
+
+    Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
+    nodes. The elastic closing is twice the strain energy over ∫ p, the largest it can be.
+    """
+    scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
+    pushed = np.maximum(state.pressure, 0.0) * problem.constraints.covered
+    force = float(pushed[: scene.n_multipliers].sum())
+    closing = 2 * strain_energy(scene, state) / force if force > 0 else 0.0
+    for zone in scene.zones:
+        mine, missed = zone.numbers, _missed(scene, zone)
+        if missed is None:
+            continue
+        if not pushed[mine].any():
+            left = state.gap[mine][zone.operator.covered > 0].min(initial=np.inf)
+            peak = float(missed.depth.max()) / _MEAN[1]
+            depth = max(depth, peak / left if left > 0 else 0.0)
+            continue
+        gaps[mine] = missed.gap
+        if closing > 0:
+            depth = max(depth, float(pushed[mine] @ missed.depth / pushed[mine].sum() / closing))
+    closed = state.iterate.closed & problem.constraints.normal
+    if not gaps[closed].any():
+        return Facets(0.0, depth)
+    change, shares = problem.pressure_of_gaps(closed, gaps), [0.0]
+    for zone in scene.zones:
+        weight, mine = zone.operator.covered, zone.numbers
+        size = weight @ state.pressure[mine] ** 2
+        if gaps[mine].any() and size > 0:
+            shares.append(float(np.sqrt(weight @ change[mine] ** 2 / size)))
+    return Facets(max(shares), depth)
+
+
+class _Missed(NamedTuple):
+    """By macro-element (m,): the mean over neighbours of what facets add to a gap, and how far
+    facets of both sides miss their surfaces."""
+
+    gap: np.ndarray
+    depth: np.ndarray
+
+
+def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
+    """What the facets of a zone miss; None where they miss nothing, or both sides the same."""
+    operator, body = zone.operator, scene.case.rigid.get(zone.zone.master)
+    if zone.zone.clearance is not None or operator.nodes is not None or not zone.master_faces:
+        return None
+    slave = _bend(scene.points, zone.slave_faces)
+    rise, depth = slave.rise, np.abs(slave.rise)
+    if body is None or not body.surface:
+        master = _bend(scene.points, zone.master_faces)
+        _, near = cKDTree(master.middle).query(slave.middle)
+        rise, depth = rise + master.rise[near], depth + np.abs(master.rise[near])
+    apart = operator.initial + zone.zone.interference * operator.covered
+    if not (np.abs(apart) > _FITS * depth.max() * operator.covered).any():
+        return None  # the facets of both sides lie on one another
+    number = np.concatenate([block.number for block in zone.slave_faces])
+    faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in zone.slave_faces]
+    around = vertex_neighbours(faces, zone.count).astype(float) @ sparse.diags(operator.surface.area)
+    by_macro = np.zeros((2, zone.count))
+    by_macro[:, number] = rise, depth
+    gap = around @ by_macro[0] / np.asarray(around.sum(axis=1)).ravel()
+    return _Missed(gap, by_macro[1])
+
+
+def _bend(points: np.ndarray, blocks: Sequence[FaceBlock]) -> _Bend:
+    """The bend of all faces of a surface; zero where one of the inner vertices shows none."""
+    normal = surface_normals(points, blocks)
+    shared = np.zeros(len(points), dtype=int)
+    for block in blocks:
+        np.add.at(shared, block.nodes[:, : block.type.n_vertices], 1)
+    parts = []
+    for block in blocks:
+        kind, vertex = block.type, block.nodes[:, : block.type.n_vertices]
+        at = kind.nodes[: kind.n_vertices]
+        own = area_vectors(points, block.nodes, shape_functions(kind.name).gradients(at))
+        own /= np.linalg.norm(own, axis=2, keepdims=True)
+        middle = points[vertex].mean(axis=1)
+        arm = points[vertex] - middle[:, None]
+        square = (arm**2).sum(axis=2)
+        mean = normal[vertex]
+        lean = ((mean - own) * arm).sum(axis=2) / square  # the curvature κ
+        level = (mean * own).sum(axis=2) > _EDGE
+        inner = shared[vertex] > 1
+        size = np.where(inner, np.where(level, np.abs(lean), 0.0), np.inf).min(axis=1)
+        curved = np.where(np.isfinite(size), size, 0.0) * np.sign((lean * inner).sum(axis=1))
+        parts.append(_Bend(middle, _MEAN[kind.order] * curved * square.mean(axis=1) / 2))
+    return _Bend(*(np.concatenate(values) for values in zip(*parts, strict=True)))
