@@ -12,6 +12,11 @@ CASES =
 
 .DEFAULT_GOAL := help
 MAKEFLAGS += --no-print-directory
+# Shells and Snakemake would take such a name apart.
+ODD := $(foreach c,$$ { } ` " \ ;,$(findstring $c,$(CURDIR)))
+ifneq (,$(strip $(ODD)))
+$(error the project's folder has $(strip $(ODD)) in its path: move it to one without)
+endif
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 # Neither the user's Python packages nor modules in this folder join a run, and nothing is written
 # outside it.
@@ -19,7 +24,8 @@ unexport PYTHONPATH PYTHONHOME PYTHONSTARTUP
 export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
 export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 ALONE := .venv/bin/python -I -m
-OURS := .venv/bin/python -Es -m
+OURS := .venv/bin/python -EsP solver/__main__.py
+TESTS := .venv/bin/python -Es -m
 # A folder is taken from where make was called, also with `make -C`; quotes keep names that look like
 # numbers, and spaces.
 FROM = $(if $(filter-out $(CURDIR),$(PWD)),$(if $(filter /% ~%,$(CASES)),,$(PWD)/))
@@ -33,7 +39,7 @@ SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
 # The last lines of a run say how many passed and where the report is, also where nothing was to be
 # done, but not of an older report where the run is refused; a report of failures is a failure.
 define RUN
-@mkdir -p .snakemake && touch .snakemake/begun; $(SNAKEMAKE) $(1); status=$$?; \
+@mkdir -p .snakemake && touch .snakemake/begun; LEAVE_WITH_MAKE=yes $(SNAKEMAKE) $(1); status=$$?; \
 if test $$status = 0; then \
   test ! -f results/report/log || test results/report/log -nt .snakemake/begun \
     || tail -n 1 results/report/log; \
@@ -78,7 +84,7 @@ summary: ## print the last report's table, as Markdown
 
 compare: environment ## compare with another batch: make compare BASE=folder [THIS=folder]
 	@test -n "$(BASE)" || { echo "make compare: name a folder of results, BASE=…"; exit 2; }
-	@$(OURS) solver compare "$(BASE)" $(if $(THIS),"$(THIS)")
+	@$(OURS) compare "$(BASE)" $(if $(THIS),"$(THIS)")
 
 bench: override CONFIG += $(CHOICE) $(if $(CODES),"codes=$(CODES)")
 bench: environment ## run other codes on the cases: all installed, or CODES=calculix,kratos
@@ -95,7 +101,7 @@ CONVERGE = $(addprefix cases/,waves/tria3.yaml waves/tria6.yaml waves/quad8.yaml
 	axisymmetric/tubes-tria6.yaml axisymmetric/spheres-tria6.yaml contact-edge/tria3.yaml \
 	partial-waves/quad4.yaml receding/quad8.yaml half-planes/hertz-quad4.yaml)
 converge: environment ## uncertainty by refined meshes: of cases with known answers or CASE=my-case.yaml
-	@$(OURS) solver converge $(if $(CASE),"$(CASE)",$(CONVERGE)) \
+	@$(OURS) converge $(if $(CASE),"$(CASE)",$(CONVERGE)) \
 	  $(if $(LEVELS),--levels $(LEVELS)) -o results/report
 
 STUDY = @$(SNAKEMAKE) $@
@@ -119,23 +125,23 @@ test: test-environment ## run the tests
 	@$(ALONE) pytest -n auto --dist worksteal $(ARGS)
 
 faults: test-environment ## read 1,000 (or COUNT=…) damaged files: none may pass unnoticed
-	@$(OURS) tests.faults $(or $(COUNT),1000)
+	@$(TESTS) tests.faults $(or $(COUNT),1000)
 
 mutants: test-environment ## plant faults in the core, one at a time, and see which check catches each
-	@$(OURS) tests.faults.mutants
+	@$(TESTS) tests.faults.mutants
 
 kills: test-environment ## kill runs at 100 random moments and check that the next run recovers
-	@$(OURS) tests.workflow.kills $(ARGS)
+	@$(TESTS) tests.workflow.kills $(ARGS)
 
 cluster-test: test-environment ## compare six solves through a SLURM of one machine with a local run
-	@missing=$$($(OURS) tests.workflow.slurm --missing); \
+	@missing=$$($(TESTS) tests.workflow.slurm --missing); \
 	if test -n "$$missing"; then echo "make cluster-test: skipped: $$missing"; \
-	else $(MAKE) slurm-environment && $(OURS) tests.workflow.slurm; fi
+	else $(MAKE) slurm-environment && $(TESTS) tests.workflow.slurm; fi
 
 RESULTS = $(or $(filter %.yaml,$(CASE)),$(wildcard results/*/$(or $(CASE),*)/result.vtkhdf))
 accept: environment ## store results as the accepted values and show the difference: all or CASE=…
 	@test -n "$(RESULTS)" || { echo "make accept: there is no such result; solve first"; exit 2; }
-	@$(OURS) solver accept $(RESULTS)
+	@$(OURS) accept $(RESULTS)
 
 format: lint-environment ## format the sources
 	@$(ALONE) ruff check --quiet --fix-only .
@@ -180,7 +186,7 @@ $(SITE)/installed-%: requirements-%.txt $(SITE)/installed-run
 environment:
 ifndef INSTALLED
 	@$(MAKE) --silent $(SITE)/installed-run
-	@echo "$(CURDIR)" > $(SITE)/mortarcheck.pth
+	@grep -qxsF "$(CURDIR)" $(SITE)/mortarcheck.pth || echo "$(CURDIR)" > $(SITE)/mortarcheck.pth
 	@$(PYTHON) -Es workflow/libraries.py
 endif
 

@@ -1,6 +1,20 @@
-"""Entry of `python -m solver`."""
+"""Entry of `python -m solver`, and of this file run by its path.
+
+By its path with the option -P, no module of the current folder is imported: `-m` imports `runpy`
+first, and a file `re.py` or `enum.py` there would join it.
+"""
 
 import sys
+
+if not __package__:
+    from importlib.util import module_from_spec, spec_from_file_location
+
+    folder = __file__.rpartition("/")[0]
+    __package__ = folder.rpartition("/")[2]
+    about = {"submodule_search_locations": [folder]}
+    spec = spec_from_file_location(__package__, f"{folder}/__init__.py", **about)
+    sys.modules[__package__] = module_from_spec(spec)
+    spec.loader.exec_module(sys.modules[__package__])
 from contextlib import suppress
 from pathlib import Path
 

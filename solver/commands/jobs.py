@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING
 
 from ..case.model import job_name
 from ..system.errors import InputError, hint
+from ..system.files import hash_of
 from ..system.package import cases_folder
+from ..verification.inputs import input_files
 
 if TYPE_CHECKING:
     from ..case.model import Case
@@ -33,8 +35,8 @@ _RESERVED = ["report", "meshes", "studies", "docs"]
 class BatchJob:
     """One job: the family, the case's name, its own name, its file, how it is solved.
 
-    `mesh` holds the files of the user's own mesh, the one named in the case first, then those it
-    includes; None where a recipe makes it, none at all where the case is refused. `points` and
+    `mesh` holds the file of the user's own mesh; None where a recipe makes it, none at all where the
+    case is refused. `points` and
     `dim` estimate its size.
     """
 
@@ -71,9 +73,8 @@ class BatchJob:
     @property
     def inputs(self) -> list[str]:
         """Those files of the user that exist: case, mesh with what it includes, accepted values."""
-        accepted = Path(self.file).parent / "regression" / f"{self.name}.json"
-        files = [self.file, *(self.mesh or ()), str(accepted)]
-        return [file for file in files if Path(file).is_file()]
+        mesh = Path(self.mesh[0]) if self.mesh else None
+        return [str(f) for f in input_files(Path(self.file), mesh, self.name)]
 
     @property
     def options(self) -> str:
@@ -98,24 +99,33 @@ class BatchJob:
 
     @property
     def passed(self) -> bool:
-        """Whether it has a verdict, and it is sound."""
+        """Whether it has a verdict that can be kept, of the inputs as they are, and it is sound."""
         verdict = self.read_verdict()
-        return verdict is not None and verdict.sound
+        return verdict is not None and verdict.sound and not (self.damaged or self.stale)
 
     @property
     def damaged(self) -> bool:
-        """Whether its results are there and cannot be kept.
+        """Whether its results are there and cannot be kept: what the report calls damaged.
 
-        The verdict is damaged, its file is missing, or the machine ended the solve (memory, disk, a
-        kill).
+        Verdict or result are damaged, of another solve, or missing, or the machine ended the solve
+        (memory, disk, a kill).
         """
-        folder = Path(self.folder)
-        if not folder.is_dir():
+        from ..verification.verdict import unbound
+
+        if not Path(self.folder).is_dir():
             return False
         verdict = self.read_verdict()
         if verdict is None or verdict.transient:
             return True
-        return verdict.result is not None and not (folder / verdict.result).is_file()
+        return bool(unbound(verdict, Path(self.verdict)))
+
+    @property
+    def stale(self) -> bool:
+        """Whether its results are there, and those of other inputs: contents decide, not dates."""
+        verdict = self.read_verdict()
+        if verdict is None:
+            return False
+        return verdict.provenance.get("inputs_sha256") != hash_of(self.inputs)
 
 
 def case_files(folder: Path) -> list[Path]:
@@ -206,13 +216,13 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
     """The jobs of one case file."""
     from ..case.reader import load_case
 
-    alone = BatchJob(file.resolve().parent.name, file.stem, file.stem, str(file), mesh=())
+    alone = BatchJob(file.parent.resolve().name, file.stem, file.stem, str(file), mesh=())
     try:
         case = load_case(file)
     except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
         yield alone
         return
-    mesh, size = _mesh_files(case), _size(case)
+    mesh, size = [str(case.mesh["path"])] if "path" in case.mesh else None, _size(case)
     own = {zone.hexahedra for zone in case.zones}
     other = "pyramids" if "hexahedra" in own else "hexahedra"
     hexahedra = "path" in case.mesh or "HEXA" in str(case.mesh)
@@ -229,17 +239,6 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
                 points=size.points,
                 dim=size.dim,
             )
-
-
-def _mesh_files(case: Case) -> list[str] | None:
-    if "path" not in case.mesh:
-        return None
-    path = Path(case.mesh["path"])
-    if path.suffix.lower() != ".inp":
-        return [str(path)]
-    from ..mesh.files.deck_lines import files_of
-
-    return [str(file) for file in files_of(path)]
 
 
 def _size(case: Case) -> Size:

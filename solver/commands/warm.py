@@ -20,8 +20,8 @@ TYPE_CHECKING = False  # `typing` is long to import
 if TYPE_CHECKING:
     import resource
 
-# The package's folder: this file runs as a script, without a package.
-PACKAGE = os.path.abspath(__file__).rsplit("/", 3)[1]  # noqa: PTH100 -- pathlib is long to import
+# This file runs as a script, without a package.
+ENTRY = os.path.abspath(__file__).rsplit("/", 2)[0] + "/__main__.py"  # noqa: PTH100 -- pathlib is long to import
 SOCKET = "WARM_SOLVER"
 LIMIT = 1 << 16  # bytes of a message; a longer command runs in a new process
 # A fork keeps the number of threads with which its libraries were loaded.
@@ -39,7 +39,7 @@ def main(benchmark: str, command: list[str]) -> int:
     if not ended:
         # The command handles Ctrl-C; this process waits for its end.
         _signal.signal(_signal.SIGINT, lambda *_: None)
-        cold = [sys.executable, "-Es", "-m", PACKAGE, *command]
+        cold = [sys.executable, "-EsP", ENTRY, *command]
         process = os.spawnv(os.P_NOWAIT, sys.executable, cold)
         ended = answer(*os.wait4(process, 0)[1:])
     how, cpu_seconds, peak_memory = ended.decode().split()

@@ -7,15 +7,13 @@ inside. Source: Abbas, Drouet, Hild, The Local Average Contact (LAC) method, CMA
 """
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, Literal, Self, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import skfem
 from scipy import sparse
-from scipy.sparse import bmat, csc_matrix, csr_matrix
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_matrix
 
 from .arguments import (
     Bodies,
@@ -29,25 +27,20 @@ from .cells.faces import surface_points
 from .errors import SolveError
 from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
-from .motions import smoothed, unheld_motion
+from .motions import smoothed
 from .operator import gap_operator
 from .reconstruction import form_of, vertex_neighbours
-from .recovery import Recovery, RecoveryRequest, settled_means
-from .status import Trial, find_status
+from .recovery import Recovery, RecoveryRequest
+from .saddle_point import SaddlePoint, numbered
+from .status import find_status
 
 Boundary = tuple[skfem.Mesh, Names]
 Recovered = Literal["automatic", "linear", "quadratic", "smooth"]
 Gap = float | Callable[[np.ndarray], np.ndarray]
 # Facets that cover less of their area have no partner, and carry no pressure.
 _COVERED = 1e-9
-# Pressures and gaps of this share of the largest pressure, and of the mesh, are round-off.
-_ROUND_OFF = 1e-10
-# A pivot stays on the diagonal down to this share of its column's largest: fewer entries fill in.
-_PIVOT = 0.01
 # How often a status that the recovered pressure changes is found anew.
 _ROUNDS = 3
-_SINGULAR = "the system is singular"
-_SINGULAR_FROM = 1e14
 
 
 @dataclass(frozen=True)
@@ -73,7 +66,7 @@ class ContactState:
     gap: np.ndarray
     closed: np.ndarray
     iterations: int
-    _system: "_System" = field(repr=False, compare=False)
+    _system: SaddlePoint = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -237,7 +230,7 @@ class LocalAverageContact:
         self._unknown, points = unknown, self._points
         on_slave = np.arange(len(points)) < self.mesh.p.shape[1]
         self._bodies = Bodies(points, self._cells, unknown, on_slave, size)
-        return _numbered(self._matrix, unknown, size)
+        return numbered(self._matrix, unknown, size)
 
     def solve(
         self,
@@ -271,10 +264,10 @@ class LocalAverageContact:
         imposed = np.zeros(size) if x is None else checked_vector(x, size, "x")
         held = checked_unknowns(D, size)
         force = checked_vector(f, size, "f")
-        system = _System(self, stiffness, force, B, imposed, held, ground)
+        system = SaddlePoint(self, stiffness, force, B, imposed, held, ground)
         opposed = self._opposed
         found = find_status(system.trial, opposed, opposed, self.area, system.stiffness)
-        return system.state(found.closed, found.iterations)
+        return _state(system, found.closed, found.iterations)
 
     def recover(self, state: ContactState, form: Recovered = "automatic") -> RecoveredState:
         """A pressure of second order (`quadratic`: of third) from one constant for each facet.
@@ -300,7 +293,7 @@ class LocalAverageContact:
         recovery = gap_operator(*self._surfaces, asked=asked).recovery
         assert recovery is not None
         system, closed, size = state._system, state.closed, len(state._system.force)
-        added = _numbered(recovery.loads, self._unknown, size).T
+        added = numbered(recovery.loads, self._unknown, size).T
         for _ in range(_ROUNDS):
             fit = recovery.reconstruction(closed).matrix
             means = system.settled(closed, added @ fit, shape.sweeps)
@@ -309,134 +302,16 @@ class LocalAverageContact:
             if not (self._opposed & (found.violation(closed) > 1)).any():
                 applied = shape.degree == 2 and shape.keeps_means
                 coefficients = fit @ (means if applied else found.pressure)
-                settled = corrected.state(closed, state.iterations)
+                settled = _state(corrected, closed, state.iterations)
                 return RecoveredState(settled, recovery.error(coefficients), recovery, coefficients)
             settling = corrected.trial, closed, self._opposed, self.area, corrected.stiffness
             closed = find_status(*settling).closed
         raise SolveError("the contact status does not settle under the recovered pressure")
 
 
-def _numbered(matrix: csr_matrix, unknown: np.ndarray, size: int) -> csr_matrix:
-    """A matrix by nodes in the unknowns of the bases, of which there are `size`."""
-    entries = matrix.tocoo()
-    places = entries.row, unknown[entries.col]
-    return csr_matrix((entries.data, places), shape=(matrix.shape[0], size))
-
-
-class _System:
-    """The equations with some facets closed: a saddle point, factored anew for each status."""
-
-    def __init__(
-        self,
-        contact: LocalAverageContact,
-        stiffness: csr_matrix,
-        force: np.ndarray,
-        gaps: csr_matrix,
-        imposed: np.ndarray,
-        held: np.ndarray,
-        springs: csr_matrix | None,
-    ):
-        self.contact, self.size = contact, float(np.ptp(contact.mesh.p))
-        self.force, self.free = force, np.setdiff1d(np.arange(len(force)), held)
-        self.imposed = np.zeros(len(force))
-        self.imposed[held] = imposed[held]
-        motions = contact._bodies.motions
-        at_held = [motions[held]]
-        if springs is not None:
-            at_held.append(springs / abs(springs).max() @ motions)
-            stiffness = stiffness + springs
-        self.supports = sum((rows.T @ rows).toarray() for rows in at_held)
-        self.matrix = stiffness[self.free][:, self.free]
-        self.gaps = gaps[:, self.free]
-        self.load = (force - stiffness @ self.imposed)[self.free]
-        self.before = contact.initial + gaps @ self.imposed
-        # Makes the constraints as large as the stiffness, for the digits of the factor.
-        self.scale = abs(self.matrix.diagonal()).mean() / abs(self.gaps).max()
-        self.factored: tuple[bytes, Any] = b"", None
-
-    def under(self, force: np.ndarray) -> Self:
-        """The system under a further force (N,), with the same factor."""
-        other = copy(self)
-        other.load = self.load + force[self.free]
-        return other
-
-    def settled(self, closed: np.ndarray, loads: csr_matrix, sweeps: int) -> np.ndarray:
-        """The pressures (k,) to be reconstructed; `loads` (N, k): forces that one of them adds."""
-        before = self.trial(closed).pressure
-
-        def change(force: np.ndarray) -> np.ndarray:
-            return np.asarray(self.under(force).trial(closed).pressure - before)
-
-        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)[0]
-
-    def state(self, closed: np.ndarray, iterations: int) -> ContactState:
-        """The state with these facets closed."""
-        found = self.trial(closed)
-        return ContactState(
-            self.displacement, found.pressure, found.gap, closed, iterations, _system=self
-        )
-
-    def _factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
-        key = closed.tobytes()
-        if key != self.factored[0]:
-            self.factored = key, self._new_factor(closed)
-        return self.factored[1]
-
-    def _refuse_free_motion(self, closed: np.ndarray) -> None:
-        """SolveError where a body moves freely with these facets closed."""
-        contact, bodies = self.contact, self.contact._bodies
-        held, smooth = (
-            _numbered(rows, contact._unknown, len(self.force))[closed] @ bodies.motions
-            for rows in (contact._matrix, contact._smooth)
-        )
-        weight = sparse.diags(1 / contact.covered[closed])
-        found = unheld_motion(self.supports, weight @ held, bodies.count, weight @ smooth)
-        if found:
-            what = f"nothing keeps {bodies.names[found[0]]} from a free motion ({found[1]})"
-            count = int((~closed & contact._opposed).sum())
-            raise SolveError(f"{what}, with {count} facets open: a support is missing")
-
-    def _new_factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
-        self._refuse_free_motion(closed)
-        rows = self.scale * self.gaps[closed]
-        system = bmat([[self.matrix, rows.T], [rows, None]], "csc")
-        try:
-            factor = splu(system, "MMD_AT_PLUS_A", _PIVOT, options={"SymmetricMode": True})
-        except RuntimeError:
-            raise SolveError(_SINGULAR) from None
-        # A factor of a singular matrix makes almost any right-hand side as large as this.
-        grown = factor.solve(np.random.default_rng(0).standard_normal(system.shape[0]))
-        if not np.abs(grown).max() * abs(system).max() < _SINGULAR_FROM:
-            raise SolveError(_SINGULAR)
-        return factor, system
-
-    def trial(self, closed: np.ndarray) -> Trial:
-        """Pressure and gap (k,) with these facets closed."""
-        factor, system = self._factor(closed)
-        right = np.concatenate([self.load, -self.scale * self.before[closed]])
-        found = factor.solve(right)
-        for _ in range(2):  # the digits that pivoting lost
-            found += factor.solve(right - system @ found)
-        free, covered = len(self.free), self.contact.covered
-        pressure = np.zeros(len(closed))
-        pressure[closed] = -self.scale * found[free:]
-        seen = np.where(self.contact._opposed, covered, np.inf)
-        self.displacement = self.imposed.copy()
-        self.displacement[self.free] = found[:free]
-        least = _ROUND_OFF * np.ones(len(closed))
-        return Trial(
-            pressure=pressure,
-            gap=np.where(closed, 0.0, (self.before + self.gaps @ found[:free]) / seen),
-            pressure_limit=least * (np.abs(pressure).max(initial=0.0) or 1.0),
-            gap_limit=least * self.size,
-        )
-
-    def stiffness(self) -> np.ndarray:
-        """The forces (e, e) on eligible facets that their average gaps bring up, one at a time."""
-        covered, area, eligible = self.contact.covered, self.contact.area, self.contact._opposed
-        factor, _ = self._factor(eligible)
-        count = int(eligible.sum())
-        right = np.zeros((len(self.free) + count, count))
-        right[len(self.free) :] = self.scale * np.diag(covered[eligible])
-        pressure = -self.scale * factor.solve(right)[len(self.free) :]
-        return np.asarray(area[eligible][:, None] * pressure)
+def _state(system: SaddlePoint, closed: np.ndarray, iterations: int) -> ContactState:
+    """The state with these facets closed."""
+    found = system.trial(closed)
+    return ContactState(
+        system.displacement, found.pressure, found.gap, closed, iterations, _system=system
+    )

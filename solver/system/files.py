@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -47,6 +47,14 @@ def last_line(path: Path | None) -> str:
         return ""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
+def hash_of(files: Iterable[str | Path]) -> str:
+    """The hash of the contents of files, in their order."""
+    found = hashlib.sha256()
+    for file in map(Path, files):
+        found.update(_digest(file, file.stat().st_size))
+    return found.hexdigest()
 
 
 def seal(path: Path) -> str:

@@ -12,7 +12,7 @@ PROJECT = "mortarcheck"
 PACKAGE = __name__.partition(".")[0]
 PROGRAM = PROJECT if PACKAGE == PROJECT else f"python -m {PACKAGE}"
 """The command that starts the program."""
-COMMAND = [sys.executable, "-m", PACKAGE]
+COMMAND = [sys.executable, "-P", str(Path(__file__).parents[1] / "__main__.py")]
 """The program as a process of its own."""
 _SOURCES = Path(__file__).parents[2]
 

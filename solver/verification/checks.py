@@ -32,6 +32,7 @@ from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError
 from ..system.files import write_text
 from . import numbers, samples
+from .inputs import accepted_file
 from .verdict import CheckResult, Regression
 
 
@@ -204,7 +205,7 @@ def _over(deviation: float, scale: float) -> float:
 
 def regression_file(solution: Solution) -> Path:
     """The file of a solve's accepted values."""
-    return solution.case.path.parent / "regression" / f"{solution.job}.json"
+    return accepted_file(solution.case.path, solution.job)
 
 
 def accepted_values(solution: Solution) -> dict[str, Accepted]:

@@ -147,13 +147,16 @@ def without_result(
     case: Case | Path,
     solved_as: SolvedAs = (False, None, None),
     transient: bool = False,
+    provenance: Mapping[str, str | int] | None = None,
 ) -> Verdict:
     """The verdict of a solve that was refused, failed or crashed, for the reason given.
 
     `case` is the path of the case file where the file itself could not be read; `solved_as` are the
-    arguments of `Case.as_solved`.
+    arguments of `Case.as_solved`, `provenance` what is known of its inputs.
     """
-    return Verdict(**_identity(case, solved_as), verdict=word, reason=reason, transient=transient)
+    about = _identity(case, solved_as)
+    given = dict(provenance or {})
+    return Verdict(**about, verdict=word, reason=reason, transient=transient, provenance=given)
 
 
 def _identity(case: Case | Path, solved_as: SolvedAs) -> dict[str, Any]:
@@ -166,7 +169,7 @@ def _identity(case: Case | Path, solved_as: SolvedAs) -> dict[str, Any]:
         "recovery": recovery or "",
     }
     if isinstance(case, Path):
-        name, family = case.stem, case.resolve().parent.name
+        name, family = case.stem, case.parent.resolve().name
     else:
         name, family = case.name, case.family
         found |= {

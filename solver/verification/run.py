@@ -10,7 +10,7 @@ from pathlib import Path
 import meshio
 
 from ..case.file import HALVINGS, HALVINGS_TEXT
-from ..case.model import Case
+from ..case.model import Case, job_name
 from ..case.reader import check_mesh_file, load_case
 from ..lac.errors import SolveError
 from ..mechanics.fem.refine import refined as refined_mesh
@@ -22,9 +22,10 @@ from ..simulation.options import LEAN, Options
 from ..simulation.results.solution import Solution
 from ..simulation.simulate import assembled, solve_problem
 from ..system.errors import InputError, MachineError, of_machine
-from ..system.files import last_line
+from ..system.files import hash_of, last_line
 from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .checks import accepted_values, run_checks
+from .inputs import input_files
 from .judge import judge, without_result
 from .norms import errors
 from .provenance import gather
@@ -123,8 +124,11 @@ def solve(
     """
     case: Case | None = None
     started, clock, sha256 = processor_time(), Clock(), None
+    inputs: dict[str, str | int] = {}
     try:
+        inputs = _inputs_of(job, None)
         case = job.of(refined(load_case(job.case), job.refine))
+        inputs = _inputs_of(job, case)
         if output:  # refuse before the solve, not after it
             check_name(output)
             output.parent.mkdir(parents=True, exist_ok=True)
@@ -134,14 +138,14 @@ def solve(
         with stage(clock, "checks"):  # accepted values belong to the case's own mesh
             checks = checked(solution, job.refine == 1)
         solution.cpu_seconds = processor_time() - started
-        provenance = gather(job.case, job.mesh or case.mesh.get("path"))
+        provenance = gather(job.case, job.mesh or case.mesh.get("path")) | inputs
         if output:
             with stage(clock, "write"):
                 sha256 = write_result(output, solution, checks, provenance)
     except Exception as error:
         if verdict_file:
             word, reason, transient = _ending(error)
-            ended = without_result(word, reason, case or job.case, job.solved_as, transient)
+            ended = without_result(word, reason, case or job.case, job.solved_as, transient, inputs)
             write_verdict(verdict_file, ended)
         raise
     name = os.path.relpath(output, (verdict_file or output).parent) if output else None
@@ -152,6 +156,13 @@ def solve(
     if then:
         then(solution, verdict)
     return verdict
+
+
+def _inputs_of(job: Job, case: Case | None) -> dict[str, str | int]:
+    """The hash of the files that the job reads, before any of them is read."""
+    name = job_name(case.name if case else job.case.stem, *job.solved_as)
+    mesh = case.mesh.get("path") if case else None
+    return {"inputs_sha256": hash_of(input_files(job.case, Path(mesh) if mesh else None, name))}
 
 
 def _mesh_of(job: Job, case: Case, clock: Clock) -> meshio.Mesh:

@@ -75,3 +75,17 @@ def derived(units: Mapping[str, str], spatial: bool) -> dict[str, str]:
 def with_unit(text: str, unit: str | None) -> str:
     """The text of a label with its unit, if there is one."""
     return f"{text} [{unit}]" if unit else text
+
+
+# No share is shown as less than a thousandth of a percent.
+_LEAST = 1e-5
+
+
+def percent(share: float) -> str:
+    """A bound in percent, two digits of it, and 0.001 % at least.
+
+    >>> percent(0.0412), percent(1e-9), percent(3.2)
+    ('4.1 %', '0.001 %', '320 %')
+    """
+    rounded = float(f"{100 * max(share, _LEAST):.2g}")
+    return f"{rounded:g} %"

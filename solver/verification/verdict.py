@@ -20,6 +20,7 @@ import numpy as np
 
 from ..system.errors import InputError
 from ..system.files import seal_of, write_text
+from .units import percent
 
 PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
 REFUSED, CRASHED, PARTIAL = "refused", "crashed", "partial"
@@ -35,8 +36,6 @@ NUMBERS = (
 """The checks of single numbers."""
 T = TypeVar("T")
 _DIGEST = "digest"
-# A share of less than a thousandth of a percent.
-_NEGLIGIBLE = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,18 +145,6 @@ class CheckError:
     name: str
     zone: str | None = None
     error: float = math.nan
-
-
-def percent(share: float) -> str:
-    """A share in percent, two digits of it.
-
-    >>> percent(0.0412), percent(1e-9), percent(3.2)
-    ('4.1 %', 'below 0.001 %', '320 %')
-    """
-    if share < _NEGLIGIBLE:
-        return "below 0.001 %"
-    digits = max(0, 1 - int(np.floor(np.log10(100 * share))))
-    return f"{100 * share:.{digits}f} %" if share < 1 else f"{float(f'{100 * share:.2g}'):.0f} %"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,8 +300,8 @@ class Verdict:
         if not self.pressure or not self.zones or self.code:
             return ""
         if self.pressure_within is None:
-            return "; estimated error of the pressure: none can be given"
-        return f"; estimated error of the pressure: {percent(self.pressure_within)}"
+            return ", error of the pressure unknown"
+        return f", pressure within {percent(self.pressure_within)} (estimated)"
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""

@@ -62,6 +62,8 @@ def verdict(job, word, reason="", **more):
         "cpu_seconds": 0.7,
         "peak_memory_mb": 100.0,
         "pressure_error_estimate": 0.0123,
+        "pressure_within": 0.0123,
+        "zones": [{"name": "interface", "slave": "s", "master": "m"}],
         "pressure": [24.9, 25.0000000001],
         "stress": [-25.0, -25.0],
         "gap": [-1e-16, 2e-16],
@@ -219,7 +221,7 @@ def test_pages_show_counts_beside_the_reference_and_say_which_sign(report):
 
 def test_pages_show_the_estimated_error(report):
     folder, _ = report
-    assert "estimated error of the pressure: 1.2 %." in (folder / "fam.html").read_text()
+    assert "pressure within 1.2 % (estimated)." in (folder / "fam.html").read_text()
 
 
 def test_pages_list_the_forces_of_each_step_and_the_probes(tmp_path):

@@ -329,7 +329,7 @@ def test_the_recovery_asked_for_takes_the_place_of_the_cases_own(tmp_path):
     assert (own["verdict"], own["checks"]) == ("passed", given.record["checks"])
     estimates = [given.outcome.pressure_error_estimate, asked.outcome.pressure_error_estimate]
     assert estimates == pytest.approx([0.0116] * 2, rel=0.05)
-    assert "estimated error of the pressure: 1.2 %" in str(given)
+    assert "pressure within 1.2 % (estimated)" in str(given)
     assert main(["solve", str(case), "--recovery", "linear", "-o", str(tmp_path / "r.vtkhdf")]) == 0
     [zone] = read_result(tmp_path / "r.vtkhdf").solution.zones
     assert (zone.recovered.coefficients == asked.zones["contact"].recovered.coefficients).all()

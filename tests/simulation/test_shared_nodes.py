@@ -7,7 +7,7 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.mechanics.linear.choice import force_solver
-from solver.simulation.judgement.plan import meshed
+from solver.simulation.judgement.validity import meshed
 from solver.simulation.scene.attributes import Attributes
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate

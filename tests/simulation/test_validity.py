@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import solver.lac.threads
-import solver.simulation.judgement.plan
+import solver.simulation.judgement.validity
 from solver.lac.cells.catalogue import BY_NAME
-from solver.simulation.judgement import plan as validity
-from solver.simulation.judgement.plan import inside_others
+from solver.simulation.judgement import validity
+from solver.simulation.judgement.validity import inside_others
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests import scenes
@@ -124,7 +124,7 @@ def test_cells_in_one_another(name):
 @pytest.mark.parametrize("layers", [0, 1, 2])
 def test_layers_of_cells_in_one_another(monkeypatch, many, layers, threads):
     """Two cubes of 3³ cells: of so many layers of each, the middles are in the other one."""
-    monkeypatch.setattr(solver.simulation.judgement.plan, "_AT_ONCE", many)
+    monkeypatch.setattr(solver.simulation.judgement.validity, "_AT_ONCE", many)
     monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
     points, cells = grid(3)
     depth = np.ptp(points[:, 0]) * (layers + 0.1) / 3

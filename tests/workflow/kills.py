@@ -176,7 +176,7 @@ def _victims(first, struck):
     if struck == "first":
         return [first]
     session = [process for process in _processes() if _session(process) == first]
-    forks = [process for process in session if "solver" in _command(process)]
+    forks = [p for p in session if any("solver/__main__" in part for part in _command(p))]
     return {"server": forks[:1], "job": forks[-1:], "all": session}[struck]
 
 

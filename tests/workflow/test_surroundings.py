@@ -41,6 +41,8 @@ def test_foreign_modules_do_not_join_a_run_and_nothing_is_written_into_the_home_
     hostile, home = tmp_path / "hostile", tmp_path / "home"
     hostile.mkdir()
     home.mkdir()
+    for name in ("re", "types", "enum", "solver"):
+        (project / f"{name}.py").write_text(TAKEN_OVER)
     for name in ("yaml", "numpy", "h5py", "jsonschema"):
         (project / f"{name}.py").write_text(TAKEN_OVER)
         (hostile / f"{name}.py").write_text(TAKEN_OVER)
@@ -50,6 +52,8 @@ def test_foreign_modules_do_not_join_a_run_and_nothing_is_written_into_the_home_
     assert "The one solve passed." in run.stdout
     assert list(home.iterdir()) == []
     solve = [sys.executable, "-m", "solver", "validate", "cases/tiny/tiny-b.yaml"]
+    for name in ("re", "types", "enum"):  # `-m` imports them before anything of ours
+        (project / f"{name}.py").unlink()
     direct = subprocess.run(solve, cwd=project, capture_output=True, text=True)
     assert direct.stdout == "cases/tiny/tiny-b.yaml: valid\n"
 

@@ -233,6 +233,50 @@ def test_a_dry_run_changes_nothing(project):
     assert jobs(project) == set()
 
 
+def test_contents_decide_not_dates(project):
+    """A case copied over another one with an older date: no run calls its solve up to date."""
+    case = project / "cases" / "tiny" / "tiny-b.yaml"
+    case.write_text(case.read_text().replace("pressure: 25.0", "pressure: 24.0"))
+    os.utime(case, (1e9, 1e9))
+    assert jobs(project) >= {"solve tiny-b"} | REPORT
+    for target in (["--config", "failed=true"], ["report"]):
+        shutil.copytree(project, other := project.with_name(f"other-{target[-1]}"))
+        run = snakemake(other, *target)
+        told = summary(other)["tiny-b"]
+        assert (told["verdict"], told["pressure"][0]) == ("passed", pytest.approx(24.0)), run.stdout
+
+
+def test_a_report_that_ends_early_is_no_success(project):
+    page = project / "results" / "report" / "tiny.html"
+    page.unlink()
+    (page / "in the way").mkdir(parents=True)
+    append(project / "solver" / "report" / "page.py", "# changed\n")
+    assert snakemake(project).returncode != 0
+    shutil.rmtree(page)
+    assert snakemake(project).returncode == 0
+    assert page.is_file()
+    assert jobs(project) == set()
+
+
+def test_a_case_file_that_is_a_link_to_itself_is_one_refused_case(project):
+    loop = project / "cases" / "tiny" / "loop.yaml"
+    loop.symlink_to(loop.name)
+    assert snakemake(project).returncode != 0
+    assert {name: v["verdict"] for name, v in summary(project).items()} == {
+        "loop": "refused", "tiny-a": "passed", "tiny-a-swapped": "passed", "tiny-b": "passed",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["a{b}", "a$(touch pwned)", "a`b`", "a;b"])
+def test_a_folder_whose_name_would_be_run_is_refused(name, tmp_path):
+    (tmp_path / name).mkdir()
+    shutil.copy(ROOT / "Makefile", tmp_path / name)
+    done = subprocess.run(["make", "all-cases"], cwd=tmp_path / name, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "in its path: move it to one without" in done.stderr
+    assert not list(tmp_path.rglob("pwned"))
+
+
 @pytest.mark.parametrize(
     "damage",
     [
@@ -240,6 +284,8 @@ def test_a_dry_run_changes_nothing(project):
         lambda solve: (solve / "verdict.json").write_text('"passed"'),
         lambda solve: (solve / "verdict.json").unlink(),
         lambda solve: (solve / "result.vtkhdf").unlink(),
+        lambda solve: os.truncate(solve / "result.vtkhdf", 20000),
+        lambda solve: shutil.copy(solve.with_name("tiny-a") / "result.vtkhdf", solve),
         shutil.rmtree,
     ],
 )

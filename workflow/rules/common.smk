@@ -66,11 +66,13 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # What jobs call: `program COMMAND`, and `warm FILE COMMAND`, which runs in a fork of the warm process,
 # if there is one, and writes its cost to a file. These processes ignore PYTHONPATH and the user's own
 # packages. As functions of the shell they are no part of the code of a rule, and known in a module.
-PYTHON = f"{shlex.quote(sys.executable)} -Es"
+PYTHON = f"{shlex.quote(sys.executable)} -EsP"
+ENTRY = str(FOLDER / "__main__.py")
 WARM = f"{PYTHON} -IS {shlex.quote(str(FOLDER / 'commands/warm.py'))}"
 NO_CHECK = "--no-memory-check" * (config["memory_check"] in (False, "false"))
 shell.prefix(
-    f'program() {{{{ {PYTHON} -m {PACKAGE} "$@"; }}}}; warm() {{{{ {WARM} "$@"; }}}}; '
+    "set -euo pipefail; "
+    f'program() {{{{ {PYTHON} {shlex.quote(ENTRY)} "$@"; }}}}; warm() {{{{ {WARM} "$@"; }}}}; '
     f"memory_check={NO_CHECK}; "
 )
 

@@ -1,9 +1,11 @@
 """Before jobs run: lock the folder, remove results that cannot be kept, start what jobs are forks of."""
 
 import atexit
+import ctypes
 import fcntl
 import logging
 import shutil
+import signal
 import socket
 import tempfile
 
@@ -50,7 +52,7 @@ def begin_warm():
         listener.bind(f"{folder.name}/warm")
         listener.listen()
         server = subprocess.Popen(
-            [sys.executable, "-Es", "-m", PACKAGE, "serve", str(listener.fileno())],
+            [sys.executable, "-EsP", ENTRY, "serve", str(listener.fileno())],
             stdin=subprocess.PIPE,  # closed when this run ends
             pass_fds=[listener.fileno()],
             env={**os.environ, **dict.fromkeys(part("system.process").THREADS, "1")},
@@ -68,6 +70,13 @@ def end_warm(server, folder):
     folder.cleanup()
 
 
+def leave_with_make():
+    """End as by Ctrl-C when the shell of `make` dies: TERM to make alone ends that shell alone."""
+    if sys.platform == "linux" and os.environ.pop("LEAVE_WITH_MAKE", ""):
+        set_death_signal = 1
+        ctypes.CDLL(None).prctl(set_death_signal, signal.SIGINT)
+
+
 def begin(record):
     """A filter of the log that lets all through: before the first job. A module has no `onstart`."""
     if str(getattr(record, "event", None)) == "run_info":
@@ -79,8 +88,12 @@ def begin(record):
 # A dry run changes nothing, and Snakemake reports it well.
 if workflow.is_main_process and not workflow.output_settings.dryrun:
     LOCK = take_lock()  # as long as this process lives
-    for job in RUN.values():
-        if job.damaged:  # Snakemake finds it missing
+    for job in RUN.values():  # Snakemake finds missing what is removed
+        stale = job.stale
+        if stale and job.mesh_folder:
+            shutil.rmtree(job.mesh_folder, ignore_errors=True)
+        if stale or job.damaged:
             shutil.rmtree(job.folder)
+    leave_with_make()
     report_progress()
     logger.addFilter(begin)

@@ -75,8 +75,6 @@ def visualize(n=8):
 
 
 if __name__ == "__main__":
-    solved = {n: hertz(n) for n in (6, 10)}
-    errors = {n: error for n, (_, _, error) in solved.items()}
-    print(f"largest pressure {solved[10][1].max():.4g}, Hertz: {P0:.4g}")
-    order = np.log(errors[6] / errors[10]) / np.log(10 / 6)
-    print(f"relative error of the pressures {errors[6]:.3f}, {errors[10]:.3f}: order {order:.2f}")
+    (_, _, coarse), (_, found, fine) = hertz(6), hertz(10)
+    print(f"largest pressure {found.max():.4g}, Hertz: {P0:.4g}; relative error of the pressures")
+    print(f"{coarse:.3f}, {fine:.3f}: order {np.log(coarse / fine) / np.log(10 / 6):.2f}")

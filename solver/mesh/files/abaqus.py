@@ -16,7 +16,7 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 from ...system.errors import InputError
-from .deck_lines import Block, keyword_blocks, number, place
+from .deck_lines import Keyword, keyword_blocks, number, place
 
 _SOLIDS = {k.n_nodes: name for name, k in BY_NAME.items() if k.dim == 3 and k.abaqus}
 _SURFACES = {kind.n_nodes: name for name, kind in BY_NAME.items() if kind.dim == 2}
@@ -85,9 +85,9 @@ class _Deck:
         self.cells: dict[int, tuple[CellType, list[int]]] = {}
         self.cell_sets: dict[str, _Set] = defaultdict(_Set)
         self.node_sets: dict[str, _Set] = defaultdict(_Set)
-        self.surfaces: dict[str, Block] = {}
-        self.sections: list[Block] = []
-        self.beams: Block | None = None
+        self.surfaces: dict[str, Keyword] = {}
+        self.sections: list[Keyword] = []
+        self.beams: Keyword | None = None
         self.spelling: dict[str, str] = {}
         self.seen: set[str] = set()
 
@@ -96,7 +96,7 @@ class _Deck:
         """The dimension of the cells that make the bodies."""
         return max((cell.dim for cell, _ in self.cells.values()), default=0)
 
-    def take(self, block: Block) -> None:
+    def take(self, block: Keyword) -> None:
         if block.keyword in ("PART", "INSTANCE"):
             if block.keyword in self.seen or block.lines:
                 raise block.refusal("allowed: one part and one instance, not moved")
@@ -118,7 +118,7 @@ class _Deck:
         self.spelling.setdefault(name.upper(), name)
         return name.upper()
 
-    def _take_nodes(self, block: Block) -> None:
+    def _take_nodes(self, block: Keyword) -> None:
         members = _Set()
         for line in block.lines:
             n = number(line, 0)
@@ -129,7 +129,7 @@ class _Deck:
         if "NSET" in block.options:
             self.node_sets[self._key(block.options["NSET"])].add(members)
 
-    def _take_cells(self, block: Block) -> None:
+    def _take_cells(self, block: Keyword) -> None:
         kind = block.options["TYPE"]
         cell = self._cell_type(block, kind.upper())
         if kind.upper().startswith("B"):
@@ -154,7 +154,7 @@ class _Deck:
         if "ELSET" in block.options:
             self.cell_sets[self._key(block.options["ELSET"])].add(members)
 
-    def _cell_type(self, block: Block, name: str) -> CellType:
+    def _cell_type(self, block: Keyword, name: str) -> CellType:
         plane = _PLANE.match(name)
         found = _LINES.get(name.removesuffix("H"))
         if solid := re.match(r"C3D(\d+)", name):
@@ -166,7 +166,7 @@ class _Deck:
             raise InputError(block.where, "*ELEMENT, TYPE", name, f"allowed: {allowed}")
         return BY_NAME[found]
 
-    def _take_set(self, sets: dict[str, _Set], block: Block, name: str) -> None:
+    def _take_set(self, sets: dict[str, _Set], block: Keyword, name: str) -> None:
         members = sets[self._key(name)]
         for line in block.lines:
             if "GENERATE" in block.options:
@@ -185,7 +185,7 @@ class _Deck:
                 else:
                     raise line.refusal(f"set {name}", entry, "no such set above it")
 
-    def _take_surface(self, block: Block) -> None:
+    def _take_surface(self, block: Keyword) -> None:
         name, kind = block.options["NAME"], block.options.get("TYPE", "ELEMENT").upper()
         if name.upper() in self.surfaces:
             raise block.refusal(f"two surfaces have the name {name}")
@@ -258,7 +258,7 @@ class _Deck:
         if self.beams and dim == 3:
             raise self.beams.refusal(f"{self.beams.options['TYPE']}: beams beside solids")
 
-    def _faces(self, name: str, block: Block) -> Iterator[tuple[CellType, list[int]]]:
+    def _faces(self, name: str, block: Keyword) -> Iterator[tuple[CellType, list[int]]]:
         """The faces of a surface, whose lines hold a cell, or a set of them, and a face."""
         key, dim = f"surface {self.spelling[name]}", self.dim
         for line in block.lines:

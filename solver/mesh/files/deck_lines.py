@@ -64,7 +64,7 @@ _FULL_CIRCLE = 360.0
 
 
 @dataclass(frozen=True)
-class Line:
+class DataLine:
     """A data line: its file and number, and its fields without blanks and quotes."""
 
     file: Path
@@ -82,14 +82,14 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Block:
+class Keyword:
     """A keyword without its blanks, its options, and its data lines."""
 
     file: Path
     row: int
     name: str
     options: dict[str, str]
-    lines: list[Line] = field(default_factory=list)
+    lines: list[DataLine] = field(default_factory=list)
 
     @cached_property
     def keyword(self) -> str:
@@ -106,7 +106,7 @@ class Block:
         return InputError(self.where, f"*{' '.join(self.name.upper().split())}", None, allowed)
 
 
-def keyword_blocks(path: Path) -> Iterator[Block]:
+def keyword_blocks(path: Path) -> Iterator[Keyword]:
     """Each keyword with its options and data lines, includes followed; InputError for the rest."""
     in_step = False
     for block in _blocks(path, path.parent, (path,)):
@@ -125,7 +125,7 @@ def keyword_blocks(path: Path) -> Iterator[Block]:
         yield block
 
 
-def _check_ignored(block: Block, in_step: bool) -> None:
+def _check_ignored(block: Keyword, in_step: bool) -> None:
     known = in_step and block.keyword not in _CHANGING
     if not known and block.keyword not in IGNORED:
         raise block.refusal("not followed: the deck must be a mesh, written out")
@@ -134,9 +134,9 @@ def _check_ignored(block: Block, in_step: bool) -> None:
             raise block.refusal(f"option {option} would change the mesh or tie it: remove it")
 
 
-def _blocks(path: Path, job: Path, inside: tuple[Path, ...]) -> Iterator[Block]:
+def _blocks(path: Path, job: Path, inside: tuple[Path, ...]) -> Iterator[Keyword]:
     """The blocks of a file and of those it includes; `job`: the folder that names start from."""
-    block: Block | None = None
+    block: Keyword | None = None
     head = ""
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     for row, raw in enumerate(text.splitlines(), start=1):
@@ -159,18 +159,18 @@ def _blocks(path: Path, job: Path, inside: tuple[Path, ...]) -> Iterator[Block]:
             continue
         if block is None:
             raise InputError(f"{path}, line {row}", "data", line, "stands under no keyword")
-        block.lines.append(Line(path, row, _fields(line)))
+        block.lines.append(DataLine(path, row, _fields(line)))
     if head:
         raise InputError(f"{path}, line {start}", "keyword", head, "does not end")
     if block:
         yield block
 
 
-def _keyword(path: Path, row: int, head: str) -> Block:
+def _keyword(path: Path, row: int, head: str) -> Keyword:
     name, *rest = _fields(head[1:])
     pairs = [part.partition("=") for part in rest if part]
     options = {"".join(k.upper().split()): v.strip().strip('"') for k, _, v in pairs}
-    return Block(path, row, name, options)
+    return Keyword(path, row, name, options)
 
 
 def _fields(line: str) -> list[str]:
@@ -191,7 +191,7 @@ def _fields(line: str) -> list[str]:
 
 
 def _included(
-    block: Block, job: Path, inside: tuple[Path, ...]
+    block: Keyword, job: Path, inside: tuple[Path, ...]
 ) -> tuple[Path, Path, tuple[Path, ...]]:
     """The file of an *INCLUDE: its name starts from the folder of the job, or of its own file."""
     file = _named(block.options.get("INPUT", ""), job, block.file)
@@ -226,10 +226,10 @@ _INCLUDED = re.compile(
 )
 
 
-def number(line: Line, i: int) -> int:
+def number(line: DataLine, i: int) -> int:
     """The whole number in a field of a line; InputError for anything else.
 
-    >>> number(Line(Path("deck.inp"), 3, ["7"]), 0)
+    >>> number(DataLine(Path("deck.inp"), 3, ["7"]), 0)
     7
     """
     text = line.fields[i] if i < len(line.fields) else ""
@@ -238,12 +238,12 @@ def number(line: Line, i: int) -> int:
     return int(text)
 
 
-def place(line: Line, system: str, block: Block) -> list[float]:
+def place(line: DataLine, system: str, block: Keyword) -> list[float]:
     """The place x, y, z of a node, whose number is the first field; a blank coordinate is zero.
 
     `system`: R, or C: radius, angle in degrees, z. Exponents may be written with D.
 
-    >>> place(Line(Path("deck.inp"), 3, ["7", "", "-5.0D-1"]), "R", None)
+    >>> place(DataLine(Path("deck.inp"), 3, ["7", "", "-5.0D-1"]), "R", None)
     [0.0, -0.5, 0.0]
     """
     found = []

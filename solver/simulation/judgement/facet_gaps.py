@@ -40,7 +40,7 @@ class _Bend(NamedTuple):
     rise: np.ndarray
 
 
-class Facets(NamedTuple):
+class FacetEffect(NamedTuple):
     """What facets do, the most of all zones; zero without any.
 
     `pressure`: the L2 change of a zone's pressure by the gap that facets add on the average, over
@@ -52,7 +52,7 @@ class Facets(NamedTuple):
     depth: float
 
 
-def facets_of(problem: ContactProblem, state: Equilibrium) -> Facets:
+def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     """What facets do to a state, its status kept.
 
     Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
@@ -76,14 +76,14 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> Facets:
             depth = max(depth, float(pushed[mine] @ missed.depth / pushed[mine].sum() / closing))
     closed = state.iterate.closed & problem.constraints.normal
     if not gaps[closed].any():
-        return Facets(0.0, depth)
+        return FacetEffect(0.0, depth)
     change, shares = problem.pressure_of_gaps(closed, gaps), [0.0]
     for zone in scene.zones:
         weight, mine = zone.operator.covered, zone.numbers
         size = weight @ state.pressure[mine] ** 2
         if gaps[mine].any() and size > 0:
             shares.append(float(np.sqrt(weight @ change[mine] ** 2 / size)))
-    return Facets(max(shares), depth)
+    return FacetEffect(max(shares), depth)
 
 
 class _Missed(NamedTuple):
