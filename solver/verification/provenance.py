@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..lac.threads import cores
-from ..system.package import PROJECT, in_project, project_version
+from ..system.package import PACKAGE, PROJECT, in_project, project_version
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "h5py", "gmsh")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -53,7 +53,9 @@ def _command() -> list[str]:
     """The command as a user types it, without the options that the batch adds (warm.py)."""
     if Path(sys.argv[0]).name == PROJECT:
         return [PROJECT, *sys.argv[1:]]
-    return ["python", *(a for a in sys.orig_argv[1:] if a != "-Es")]
+    if Path(sys.argv[0]).name == "__main__.py":
+        return ["python", "-m", PACKAGE, *sys.argv[1:]]
+    return ["python", *sys.orig_argv[1:]]
 
 
 @cache

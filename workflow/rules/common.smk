@@ -132,6 +132,8 @@ def choose_jobs():
     return {job.key: job for job in jobs}
 
 
+# A dry run changes no dates: it is told by a parameter what a run would solve again.
+DRY = workflow.output_settings.dryrun
 BATCH = find_jobs()
 FAMILIES = chosen("family", {job.family for job in BATCH.values()})
 RUN = choose_jobs()

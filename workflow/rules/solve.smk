@@ -45,7 +45,7 @@ rule solve:
         case=lambda w: batch(w).file,
         mesh=mesh_option,
         options=lambda w: batch(w).options,
-        damaged=lambda w: batch(w).damaged or batch(w).stale,
+        doubted=lambda w: DRY and (batch(w).damaged or batch(w).stale),
         program=SOLVER_HASH,
     message:
         "solve {wildcards.job}"

@@ -88,12 +88,14 @@ def begin(record):
 # A dry run changes nothing, and Snakemake reports it well.
 if workflow.is_main_process and not workflow.output_settings.dryrun:
     LOCK = take_lock()  # as long as this process lives
-    for job in RUN.values():  # Snakemake finds missing what is removed
-        stale = job.stale
-        if stale and job.mesh_folder:
+    for job in RUN.values():
+        if not (job.damaged or job.stale):
+            continue
+        if job.stale and job.mesh_folder:
             shutil.rmtree(job.mesh_folder, ignore_errors=True)
-        if stale or job.damaged:
-            shutil.rmtree(job.folder)
+        shutil.rmtree(job.folder)
+        # Whatever the target, the report of what is missing is missing too.
+        Path("results/report/summary.json").unlink(missing_ok=True)
     leave_with_make()
     report_progress()
     logger.addFilter(begin)
