@@ -1,11 +1,11 @@
 """Equilibrium of a step with Coulomb friction: which macro-elements are open, stick or slip.
 
-Each solve has a status of all macro-elements, and bounds and directions of slip from the one before
-(`lac.friction`). The search starts from the last step; then without friction; then with all of the
-contact stuck. Where statuses repeat or bounds do not settle, the problem is solved by a sequence of
-cone programs (`mortar.tresca`), and the search goes on from there to round-off. What does not
-settle then is no solution. A solution need not be the only one: for large coefficients there may be
-others.
+The state is found on the contact alone, by Newton's method (`mortar.coulomb`), and solved for to
+round-off by an iteration whose solves have the bounds and directions of slip of the one before
+(`lac.friction`). Where the contact is too large for that, or Newton's method finds no state, the
+iteration starts from the last step; then without friction; then with all of the contact stuck. What
+does not settle is no solution. A solution need not be the only one: for large coefficients there
+may be others.
 """
 
 import logging
@@ -26,7 +26,7 @@ from ...lac.friction import (
     without_friction,
 )
 from ...lac.status import StatusResult
-from ...mechanics.mortar.tresca import coulomb_by_cones
+from ...mechanics.mortar.coulomb import CoulombContact
 from .problem import ContactProblem
 from .state import Equilibrium, Friction
 
@@ -37,8 +37,14 @@ _SETTLED, _STALLED = 1e-13, 1e-10
 _SLOW, _PATIENCE = 0.5, 12
 # Changes below this share of the bounds are too small to tell by what they contract.
 _MEASURED = 1e-9
-# More macro-elements than this make the matrix of the cone program too large.
-_MOST_CONES = 3000
+# Corrections of the jumps, and the fault of the law by the largest force that ends them; one that
+# stands where rounding lets it fall no more.
+_CORRECTIONS, _EXACT, _STANDS, _TOLERATED = 6, 1e-15, 1e-12, 1e-6
+# Estimated errors of the pressure from which a status is solved for with its rows alone: those of
+# sticking macro-elements cost digits where they slip.
+_ACCURATE = 1e-9
+# More rows than this make the matrix of the contact alone too large.
+_MOST_ROWS = 4000
 
 
 # Bounds that a solve has, and those that its pressures yield.
@@ -75,15 +81,16 @@ class Search:
         self.coefficient = np.repeat([zone.zone.friction for zone in zones], counts)
         self.area = problem.constraints.covered[self.gaps]
         rows = problem.constraints.gaps[self.gaps]
-        stiff = np.median(problem.diagonal[rows.indices]) / np.median(self.area)
-        self.softness = 1 / float(stiff)
+        # Rigid unknowns have no stiffness.
+        diagonal = problem.diagonal[rows.indices]
+        self.softness = float(np.median(self.area) / np.median(diagonal[diagonal > 0]))
         last = before.friction if before else None
         self.jump = last.jump if last else np.zeros(len(numbers))
         self.total = last.total if last else np.zeros(len(numbers))
         self.count, self.changes = 0, list[int]()
-        # Whether bounds stay until no status changes: Tresca's problem is solved for each.
-        self.held = False
         self.contraction = 0.0
+        # A state by Newton's method whose digits do not suffice.
+        self.inexact: Equilibrium | None = None
         self.correction = np.zeros(problem.scene.force.shape)
         problem.count_slip_from(self.jump)
 
@@ -91,6 +98,8 @@ class Search:
         """Statuses to start from; each is made when the search from the one before fails."""
         problem, k = self.problem, len(self.rows)
         closable = problem.constraints.closable
+        if self.inexact:
+            yield status_of(problem, self.inexact)
         if self.before and self.before.friction:
             yield status_of(problem, self.before)
         try:
@@ -103,10 +112,6 @@ class Search:
         except SolveError as error:
             _LOG.info("no equilibrium without friction: %s", error)
         yield Status(closable, sticking(closable[self.gaps], k))
-        if len(self.gaps) <= _MOST_CONES:
-            self.held = True
-            if start := self._by_cones():
-                yield start
 
     def _between(self, closed: np.ndarray, pressure: np.ndarray) -> Status:
         """What slips by the tractions of a stuck contact, under the `pressure` without friction."""
@@ -187,17 +192,14 @@ class Search:
         closable, slip = self.problem.constraints.closable, status.slip
         fresh = self._bounds(response.pressure)
         wrong = np.where(closable, found.trial.violation(status.closed), 0.0)
-        slipping = violation(slip, response, slip.bound if self.held else fresh)
+        slipping = violation(slip, response, fresh)
         change, change_slip = wrong > 1, slipping > 1
         count = int(change.sum() + change_slip.sum())
         if single and count:
             change, change_slip = _worst(wrong, slipping)
         closed = status.closed ^ change
         kept = closed[self.gaps]
-        bounds = slip.bound if self.held and count else fresh
-        new, moved = following(slip, response, bounds, change_slip & kept, self.softness)
-        if self.held and not count:
-            moved = max(moved, float(np.abs(fresh - slip.bound)[response.closed].max(initial=0.0)))
+        new, moved = following(slip, response, fresh, change_slip & kept, self.softness)
         moved /= float(fresh.max(initial=0.0)) or 1.0
         _LOG.info(
             "friction: solve %d, %d closed, %d slip, %d change, bounds by %.1e",
@@ -255,39 +257,87 @@ class Search:
             ),
         )
 
-    def _by_cones(self) -> Status | None:
-        """The status that cone programs find; None where their bounds do not settle."""
-        problem, k = self.problem, len(self.rows)
-        _LOG.info("friction: cone programs of %d macro-elements", len(self.gaps))
-        problem.hold_across(None)
-        rows = problem.constraints.eligible
-        start = problem.equilibrium(self.step, rows, self.correction)
-        stiffness, area = problem.stiffness_of(rows), problem.constraints.covered[rows]
-        number = np.cumsum(rows) - 1
-        there = rows[self.gaps]
-        forces, jump, settled = coulomb_by_cones(
-            stiffness,
-            area * start.pressure[rows],
-            self.coefficient[there],
-            number[self.gaps[there]],
-            k,
-        )
-        if not settled:
+    def settled(self) -> Equilibrium | None:
+        """Equilibrium by Newton's method on the contact alone, and iterative refinement.
+
+        Jumps are imposed on the whole system, with the factor of everything closed and stuck, and
+        corrected by what the law is off then. None where the contact is too large, or the law is
+        not fulfilled in the end: then the iteration over statuses has its turn.
+        """
+        problem, k, base = self.problem, len(self.rows), self.problem.constraints
+        rows = base.eligible
+        if not 0 < rows.sum() <= _MOST_ROWS:
             return None
-        pressure, moved = np.zeros((2, len(rows)))
-        pressure[rows], moved[rows] = forces / area, jump
-        closed = problem.constraints.closable & (pressure > 0)
-        far = np.linalg.norm(moved[self.rows], axis=0)
-        bound, traction = self._bounds(pressure[self.gaps]), pressure[self.rows].T
+        problem.hold_across(None)
+        area, number = base.covered[rows], np.cumsum(rows) - 1
+        there = rows[self.gaps]
+        friction, of = self.coefficient[there], number[self.gaps[there]]
+        contact = CoulombContact(problem.contact_stiffness(), friction, of, k)
+        start = problem.with_jumps(self.step, np.zeros(len(rows)), self.correction)
+        solution = contact.solve(area * start.pressure[rows])
+        self.count += 1
+        if solution is None:
+            _LOG.info("friction: no state of the contact alone")
+            return None
+        _, z, steps = solution
+        last = np.inf
+        for _ in range(_CORRECTIONS):
+            jump = np.zeros(len(rows))
+            jump[rows] = z
+            found = problem.with_jumps(self.step, jump, self.correction)
+            self.count += 1
+            forces = area * found.pressure[rows]
+            following, fault = contact.corrected(forces, z)
+            _LOG.info("friction: %d Newton steps, law off by %.1e", steps, fault)
+            if fault < _EXACT or fault > _SLOW * last:
+                break
+            z, last = following, fault
+        closed, slips = np.zeros(len(rows), dtype=bool), np.zeros(len(self.gaps), dtype=bool)
+        closed[rows], slips[there] = (
+            np.concatenate([values, np.zeros(k * len(of), dtype=bool)]) if n == 0 else values
+            for n, values in enumerate(contact.statuses(forces, z))
+        )
+        state = self._as_equilibrium(found, closed & base.closable, slips)
+        if fault < _STANDS and state.accuracy.estimate < _ACCURATE:
+            return state
+        self.inexact = state if fault < _TOLERATED else None
+        return None
+
+    def _as_equilibrium(
+        self, found: Equilibrium, closed: np.ndarray, slips: np.ndarray
+    ) -> Equilibrium:
+        """A state of imposed jumps as one of a status: exact zeros where these belong."""
+        stuck = closed[self.gaps] & ~slips
+        pressure, gap = found.pressure.copy(), found.gap.copy()
+        free = self.problem.constraints.normal & ~closed
+        pressure[free], gap[closed] = 0.0, 0.0
+        traction = np.where(closed[self.gaps], pressure[self.rows], 0.0).T
+        slip, bound = np.where(slips, gap[self.rows], 0.0).T, self._bounds(pressure[self.gaps])
+        far = np.linalg.norm(slip, axis=1)
+        rows = closed.copy()
+        rows[self.rows] = stuck
         size = np.linalg.norm(traction, axis=1)
-        slips = closed[self.gaps] & (far > 1e-7 * far.max(initial=0.0))
-        slip = Slip(
+        found = replace(
+            found,
+            iterate=found.iterate.with_closed(rows),
+            trial=replace(found.trial, pressure=pressure, gap=gap),
+            status=replace(found.status, closed=closed),
+        )
+        response = Response(
+            closed=closed[self.gaps],
+            pressure=pressure[self.gaps],
+            traction=traction,
+            slip=slip,
+            traction_limit=found.trial.pressure_limit[self.rows].max(axis=0),
+            slip_limit=found.trial.gap_limit[self.rows].max(axis=0),
+        )
+        about = Slip(
             slips=slips,
             bound=bound,
             direction=-traction / np.where(size > 0, size, 1.0)[:, None],
             distance=np.where(slips, far, np.inf),
         )
-        return Status(closed, slip)
+        return self._equilibrium(Status(closed, about), found, response, 0 * self.correction)
 
 
 def status_of(problem: ContactProblem, state: Equilibrium) -> Status:
@@ -319,6 +369,8 @@ def solve_with_friction(
     Raises SolveError where none is found, or a body moves freely once its contact slips.
     """
     search, failure = Search(problem, step, before), None
+    if found := search.settled():
+        return found
     for start in search.starts():
         try:
             if found := search.from_status(start):
@@ -326,4 +378,6 @@ def solve_with_friction(
         except SolveError as error:
             failure = failure or error
     problem.hold_across(None)
+    if search.inexact:
+        return search.inexact
     raise failure or SolveError("no frictional equilibrium found")

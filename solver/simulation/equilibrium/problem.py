@@ -66,6 +66,7 @@ class ContactProblem:
         motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         self._motions = RigidMotions.of(scene, self.constraints, motions)
         self._moves: dict[bytes, str] = {}
+        self._contact_stiffness: np.ndarray | None = None
         self._without: tuple[Scene, Stiffness, Systems] | None = None
         refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
@@ -183,6 +184,20 @@ class ContactProblem:
         """Equilibrium with the rows `closed` (k,) and no others, under further forces (n, dim)."""
         first = self._at_rest(closed, step, correction)
         return self._refined(first, _force_scale(first), correction)
+
+    def with_jumps(
+        self, step: Step, jump: np.ndarray, correction: np.ndarray | float
+    ) -> Equilibrium:
+        """Equilibrium with the mean gaps and slips `jump` (k,) imposed on all that may close."""
+        base = self.constraints
+        self.constraints = replace(base, initial=base.initial - base.covered * jump)
+        try:
+            found = self.equilibrium(step, base.eligible, correction)
+        finally:
+            self.constraints = base
+        iterate = replace(found.iterate, constraints=base)
+        trial = replace(found.trial, gap=np.where(base.eligible, jump, iterate.gap))
+        return replace(found, iterate=iterate, trial=trial)
 
     def count_slip_from(self, jump: np.ndarray) -> None:
         """Slip is what the jump of displacement (k,) has more than this, in the rows of slip."""
@@ -350,6 +365,8 @@ class ContactProblem:
                 weight.append(recovery.stabilisation.weight[mine])
             else:
                 parts.append(sparse.csr_matrix((0, int(mine.sum()))))
+        # Rows of slip do not give way.
+        parts.append(sparse.csr_matrix((0, int(closed[~self.constraints.normal].sum()))))
         return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
 
     def _gap_stiffness(self, step: Step) -> np.ndarray:
@@ -369,6 +386,12 @@ class ContactProblem:
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
         return self.stiffness_of(eligible)
+
+    def contact_stiffness(self) -> np.ndarray:
+        """`stiffness_of` all that may close or stick; made once, for all steps."""
+        if self._contact_stiffness is None:
+            self._contact_stiffness = self.stiffness_of(self.constraints.eligible)
+        return self._contact_stiffness
 
     def stiffness_of(self, rows: np.ndarray) -> np.ndarray:
         """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed."""

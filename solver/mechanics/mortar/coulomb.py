@@ -1,0 +1,175 @@
+"""Coulomb's law on the contact alone, found by Newton's method with the whole coupling b = μp.
+
+With z = (gap, slip by tangent), means over macro-elements, S the forces that unit jumps bring up
+with everything closed and stuck, λ₀ the forces at z = 0, the forces are λ = λ₀ + S z: pressures and
+tractions times areas. For a = λ − c z with any c > 0 the law is
+
+    λ_n = max(0, a_n),    λ_t = a_t, or b a_t / |a_t| where that is shorter, b = μ max(0, a_n).
+
+Its derivative has d b = μ d a_n, which bounds from the iteration before leave out, and across the
+slip b/|a_t| (1 − d dᵀ). Source: Alart, Curnier, A mixed formulation for frictional contact problems
+prone to Newton like solution methods, CMAME 92 (1991) 353–375.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Iterations, and the fault of the law by the largest force that ends them: at once, or where it
+# falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits.
+_MOST, _EXACT, _ENOUGH, _STALLED = 60, 1e-13, 1e-9, 0.3
+_LATE, _ROUNDED = 15, 1e-6
+# Up to this coefficient the first state found is taken for the only one.
+_UNIQUE = 1.0
+# A step of the line search is halved down to this.
+_SHORTEST = 1e-3
+
+
+@dataclass(frozen=True)
+class _Law:
+    """The law at one z: its fault (r,), forces (r,), which are closed (m,) and slip (f,).
+
+    `unit` (k, f): a_t / |a_t|, `share` (f,): b / |a_t|.
+    """
+
+    fault: np.ndarray
+    forces: np.ndarray
+    closed: np.ndarray
+    slips: np.ndarray
+    unit: np.ndarray
+    share: np.ndarray
+
+
+class CoulombContact:
+    """The contact of m gaps and of f macro-elements with friction, which slip along k tangents.
+
+    `stiffness` S (r, r): rows of the gaps, then of the slips along the first tangent, and so on;
+    `friction` μ (f,); `of` (f,): the gap each one has.
+    """
+
+    def __init__(self, stiffness: np.ndarray, friction: np.ndarray, of: np.ndarray, k: int):
+        f = len(friction)
+        self.stiffness, self.friction, self.of = (stiffness + stiffness.T) / 2, friction, of
+        self.m = m = len(stiffness) - k * f
+        self.rows = [m + i * f + np.arange(f) for i in range(k)]
+        self.c = np.abs(np.diag(stiffness))
+        # One for all tangents of a macro-element, or its traction would not be along its slip.
+        for rows in self.rows:
+            self.c[rows] = np.mean([np.diag(stiffness)[each] for each in self.rows], axis=0)
+        self._slope = self.stiffness - np.diag(self.c)
+
+    def solve(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int] | None:
+        """Forces λ (r,), jumps z (r,) and the iterations, for λ₀ = `forces` (r,); None where none.
+
+        From z = 0 by plain steps, else with a line search. Where μ is above 1 there may be several
+        states: then also from where all is closed and slips, and the state in which most of the
+        contact stays closed is taken.
+
+        Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
+        what the bound 1 leaves of the pull.
+
+        >>> contact = CoulombContact(np.eye(2), np.array([0.5]), np.array([0]), 1)
+        >>> found, jump, _ = contact.solve(np.array([2.0, 1.5]))
+        >>> found.round(12).tolist(), (-jump[1:]).round(12).tolist()
+        ([2.0, 1.0], [0.5])
+        """
+        size = np.abs(forces).max(initial=0.0) or 1.0
+        start, rest = forces / size, np.zeros(len(forces))
+        found = [self._newton(rest, start, False)]
+        if self.friction.max(initial=0.0) > _UNIQUE:
+            found.append(self._newton(self._sliding(start), start, False))
+        if not any(found):
+            found = [self._newton(rest, start, True)]
+        known = [one for one in found if one is not None]
+        if not known:
+            return None
+        law, z, count = max(known, key=lambda one: int(one[0].closed.sum()))
+        return law.forces * size, z * size, count
+
+    def _sliding(self, start: np.ndarray) -> np.ndarray:
+        """The jumps z (r,) with all closed and slipping the way that the forces at rest pull."""
+        along = np.array([start[rows] for rows in self.rows])
+        size, rows = np.linalg.norm(along, axis=0), np.concatenate(self.rows)
+        unit = (along / np.where(size > 0, size, 1.0)).ravel()
+        bound = np.tile(self.friction, len(self.rows)) * unit
+        of = np.tile(self.of, len(self.rows))
+        z = np.zeros(len(start))
+        matrix = self.stiffness[np.ix_(rows, rows)] - bound[:, None] * self.stiffness[np.ix_(of, rows)]
+        z[rows] = np.linalg.lstsq(matrix, bound * start[of] - start[rows], rcond=None)[0]
+        return z
+
+    def _newton(
+        self, z: np.ndarray, start: np.ndarray, searches: bool
+    ) -> tuple[_Law, np.ndarray, int] | None:
+        """The law fulfilled, its z (r,), and the steps from `z` on, with a line search or without."""
+        best = np.inf
+        for count in range(_MOST):
+            law = self._law(z, start)
+            fault = float(np.abs(law.fault).max(initial=0.0))
+            enough = _ENOUGH if count < _LATE else _ROUNDED
+            if fault < _EXACT or (fault < enough and fault > _STALLED * best):
+                return law, z, count
+            best = min(best, fault)
+            try:
+                step = np.linalg.solve(self._derivative(law), -law.fault)
+            except np.linalg.LinAlgError:
+                return None
+            z = z + (self._length(z, step, law, start) if searches else 1.0) * step
+        return None
+
+    def corrected(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, float]:
+        """The jumps (r,) after a Newton step from `forces` and `jump` that need not be those of S.
+
+        Also the fault before it, by the largest force.
+        """
+        size = np.abs(forces).max(initial=0.0) or 1.0
+        law = self._law(jump / size, (forces - self.stiffness @ jump) / size)
+        step = np.linalg.solve(self._derivative(law), -law.fault)
+        return jump + size * step, float(np.abs(law.fault).max(initial=0.0))
+
+    def statuses(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which gaps are closed (m,), and which macro-elements slip (f,).
+
+        Of a pair that the law makes complementary the larger one decides, in one unit: closed where
+        the force is more than what the gap would bring up, slip where the slip's is more than what
+        is spare of the bound.
+        """
+        m, unit = self.m, self.c * jump
+        closed = forces[:m] > unit[:m]
+        along, far = (np.linalg.norm([v[r] for r in self.rows], axis=0) for v in (forces, unit))
+        bound = self.friction * np.maximum(forces[:m][self.of], 0.0)
+        return closed, closed[self.of] & (far > bound - along)
+
+    def _length(self, z: np.ndarray, step: np.ndarray, law: _Law, forces: np.ndarray) -> float:
+        """The share of a step that lowers the fault; all of it where none does."""
+        length, now = 1.0, np.linalg.norm(law.fault)
+        while length > _SHORTEST:
+            if np.linalg.norm(self._law(z + length * step, forces).fault) < (1 - 1e-4 * length) * now:
+                return length
+            length /= 2
+        return 1.0
+
+    def _law(self, z: np.ndarray, start: np.ndarray) -> _Law:
+        forces, m = start + self.stiffness @ z, self.m
+        a = forces - self.c * z
+        normal = np.maximum(a[:m], 0.0)
+        along = np.array([a[rows] for rows in self.rows])
+        size, bound = np.linalg.norm(along, axis=0), self.friction * normal[self.of]
+        slips, length = size > bound, np.where(size > 0, size, 1.0)
+        unit = along / length
+        fault = [forces[:m] - normal]
+        fault += [forces[r] - np.where(slips, bound * u, t) for r, u, t in zip(self.rows, unit, along, strict=True)]
+        return _Law(np.concatenate(fault), forces, a[:m] > 0, slips, unit, bound / length)
+
+    def _derivative(self, law: _Law) -> np.ndarray:
+        """The derivative (r, r) of the fault by z."""
+        found, slope, m = self.stiffness.copy(), self._slope, self.m
+        found[:m] -= law.closed[:, None] * slope[:m]
+        pressed = (self.friction * law.closed[self.of])[:, None] * slope[self.of]
+        for i, rows in enumerate(self.rows):
+            sliding = law.unit[i][:, None] * pressed
+            for j, other in enumerate(self.rows):
+                across = law.share * ((i == j) - law.unit[i] * law.unit[j])
+                sliding = sliding + across[:, None] * slope[other]
+            found[rows] -= np.where(law.slips[:, None], sliding, slope[rows])
+        return found
