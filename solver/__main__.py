@@ -11,8 +11,10 @@ if not __package__:
 
     folder = __file__.rpartition("/")[0]
     __package__ = folder.rpartition("/")[2]
-    about = {"submodule_search_locations": [folder]}
-    spec = spec_from_file_location(__package__, f"{folder}/__init__.py", **about)
+    start = f"{folder}/__init__.py"
+    spec = spec_from_file_location(__package__, start, submodule_search_locations=[folder])
+    assert spec is not None
+    assert spec.loader is not None
     sys.modules[__package__] = module_from_spec(spec)
     spec.loader.exec_module(sys.modules[__package__])
 from contextlib import suppress

@@ -175,6 +175,10 @@ class MaterialKeys(Section, frozen=True):
 Coefficient = Annotated[float, Meta(ge=0, le=10, description="a number from 0 to 10")]
 
 
+# Below this the traction of friction is of the size of the rounding of forces.
+_LEAST_FRICTION = 1e-5
+
+
 class Zone(Section, frozen=True):
     """A contact zone.
 
@@ -209,6 +213,10 @@ class Zone(Section, frozen=True):
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None
+
+    def __post_init__(self) -> None:
+        if 0 < self.friction < _LEAST_FRICTION:
+            raise FieldError(("friction",), f"must be 0, or at least {_LEAST_FRICTION:g}")
 
 
 class Observation(Section, frozen=True):

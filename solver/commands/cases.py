@@ -41,7 +41,9 @@ def run_new(options: argparse.Namespace) -> int:
 
 def add_validate(command: argparse.ArgumentParser) -> None:
     command.add_argument("cases", type=Path, nargs="+", metavar="CASE.yaml")
-    command.add_argument("--mesh", action="store_true", help="also mesh them: groups, surfaces, supports")
+    command.add_argument(
+        "--mesh", action="store_true", help="also mesh them: groups, surfaces, supports"
+    )
 
 
 def run_validate(options: argparse.Namespace) -> int:

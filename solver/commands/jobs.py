@@ -35,9 +35,8 @@ _RESERVED = ["report", "meshes", "studies", "docs"]
 class BatchJob:
     """One job: the family, the case's name, its own name, its file, how it is solved.
 
-    `mesh` holds the file of the user's own mesh; None where a recipe makes it, none at all where the
-    case is refused. `points` and
-    `dim` estimate its size.
+    `mesh` holds the file of the user's own mesh; None where a recipe makes it, none at all where
+    the case is refused. `points` and `dim` estimate its size.
     """
 
     family: str

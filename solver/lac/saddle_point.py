@@ -1,4 +1,4 @@
-"""The equations of `LocalAverageContact.solve`: stiffness and gaps of closed facets in one matrix."""
+"""The equations of `LocalAverageContact`: stiffness and gaps of closed facets in one matrix."""
 
 from copy import copy
 from typing import Any, Self

@@ -9,7 +9,7 @@ def accepted_file(case: Path, job: str) -> Path:
 
 
 def input_files(case: Path, mesh: Path | None, job: str) -> list[Path]:
-    """Those that exist of: the case file, its mesh file with what that includes, accepted values."""
+    """Those that exist of: the case file, accepted values, its mesh file with what it includes."""
     files = [case, accepted_file(case, job)]
     if mesh is not None and mesh.suffix.lower() == ".inp":
         from ..mesh.files.deck_lines import files_of

@@ -84,8 +84,8 @@ def judge(
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
     relative error that rounding alone may cause, is the first reason), where the solve is beyond
-    what linear theory takes for granted, or where its mesh does not resolve the pressure. `result` is the name of
-    the result file beside the verdict and `sha256` its hash.
+    what linear theory takes for granted, or where its mesh does not resolve the pressure. `result`
+    is the name of the result file beside the verdict and `sha256` its hash.
     """
     accuracy, scatters = Accuracy(solution.accuracy), unresolved(solution)
     unreliable = [reason for reason in (accuracy.reason, scatters) if reason]

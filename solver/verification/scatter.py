@@ -26,7 +26,7 @@ from ..simulation.judgement.validity import allowed_of_pressure
 from ..simulation.results.solution import Solution, ZoneResult
 
 if TYPE_CHECKING:
-    from ..case.model import Zone
+    from ..case.file import Zone
 
 LIMIT = 0.2
 """A pressure that scatters by more is unreliable.
@@ -87,7 +87,7 @@ def _remedies(solution: Solution, zone: Zone, result: ZoneResult) -> str:
 
 
 def scatter(points: np.ndarray, zone: ZoneResult) -> float:
-    """The scatter of a zone's pressure, of `points` (n, dim) of the mesh; 0 where nothing is closed.
+    """The scatter of a zone's pressure, with the mesh's `points` (n, dim); 0 if all is open.
 
     Places beside a macro-element that the master covers in part count for nothing: their means
     belong to other places.

@@ -179,8 +179,9 @@ class Verdict:
     and maximum over all zones; `seconds` has wall times by stage and their `total`.
     `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
     reconstruction; `pressure_within` has the change by facets too, and is None where the pressure
-    is broken and nothing can be said. `units` names the units of length, stress, area, force, moment and energy where
-    the case does. `strain` to `facet_depth`: see `solver.simulation.results.solution.Validity`.
+    is broken and nothing can be said. `units` names the units of length, stress, area, force,
+    moment and energy where the case does. `strain` to `facet_depth`: see
+    `solver.simulation.results.solution.Validity`.
     `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
     succeed another time.
 

@@ -63,7 +63,6 @@ def verdict(job, word, reason="", **more):
         "peak_memory_mb": 100.0,
         "pressure_error_estimate": 0.0123,
         "pressure_within": 0.0123,
-        "zones": [{"name": "interface", "slave": "s", "master": "m"}],
         "pressure": [24.9, 25.0000000001],
         "stress": [-25.0, -25.0],
         "gap": [-1e-16, 2e-16],

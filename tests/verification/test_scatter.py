@@ -17,6 +17,7 @@ from tests.simulation.test_stabilised import LYING, STIFF, waves
 
 SIDE, CASES = 8, Path(__file__).resolve().parents[2] / "cases"
 
+
 @pytest.fixture(scope="module")
 def solved():
     """A uniform pressure on 8 × 8 slave faces of size 1 over as many master faces."""

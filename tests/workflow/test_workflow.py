@@ -271,7 +271,9 @@ def test_a_case_file_that_is_a_link_to_itself_is_one_refused_case(project):
 def test_a_folder_whose_name_would_be_run_is_refused(name, tmp_path):
     (tmp_path / name).mkdir()
     shutil.copy(ROOT / "Makefile", tmp_path / name)
-    done = subprocess.run(["make", "all-cases"], cwd=tmp_path / name, capture_output=True, text=True)
+    done = subprocess.run(
+        ["make", "all-cases"], cwd=tmp_path / name, capture_output=True, text=True
+    )
     assert done.returncode == 2
     assert "in its path: move it to one without" in done.stderr
     assert not list(tmp_path.rglob("pwned"))

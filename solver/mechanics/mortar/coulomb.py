@@ -94,14 +94,16 @@ class CoulombContact:
         bound = np.tile(self.friction, len(self.rows)) * unit
         of = np.tile(self.of, len(self.rows))
         z = np.zeros(len(start))
-        matrix = self.stiffness[np.ix_(rows, rows)] - bound[:, None] * self.stiffness[np.ix_(of, rows)]
+        matrix = (
+            self.stiffness[np.ix_(rows, rows)] - bound[:, None] * self.stiffness[np.ix_(of, rows)]
+        )
         z[rows] = np.linalg.lstsq(matrix, bound * start[of] - start[rows], rcond=None)[0]
         return z
 
     def _newton(
         self, z: np.ndarray, start: np.ndarray, searches: bool
     ) -> tuple[_Law, np.ndarray, int] | None:
-        """The law fulfilled, its z (r,), and the steps from `z` on, with a line search or without."""
+        """The law fulfilled, its z (r,), and the steps from `z` on; `searches`: along each step."""
         best = np.inf
         for count in range(_MOST):
             law = self._law(z, start)
@@ -144,7 +146,10 @@ class CoulombContact:
         """The share of a step that lowers the fault; all of it where none does."""
         length, now = 1.0, np.linalg.norm(law.fault)
         while length > _SHORTEST:
-            if np.linalg.norm(self._law(z + length * step, forces).fault) < (1 - 1e-4 * length) * now:
+            if (
+                np.linalg.norm(self._law(z + length * step, forces).fault)
+                < (1 - 1e-4 * length) * now
+            ):
                 return length
             length /= 2
         return 1.0
@@ -158,7 +163,10 @@ class CoulombContact:
         slips, length = size > bound, np.where(size > 0, size, 1.0)
         unit = along / length
         fault = [forces[:m] - normal]
-        fault += [forces[r] - np.where(slips, bound * u, t) for r, u, t in zip(self.rows, unit, along, strict=True)]
+        fault += [
+            forces[r] - np.where(slips, bound * u, t)
+            for r, u, t in zip(self.rows, unit, along, strict=True)
+        ]
         return _Law(np.concatenate(fault), forces, a[:m] > 0, slips, unit, bound / length)
 
     def _derivative(self, law: _Law) -> np.ndarray:

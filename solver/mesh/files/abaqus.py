@@ -16,7 +16,7 @@ import numpy as np
 
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME, CellType
 from ...system.errors import InputError
-from .deck_lines import Keyword, keyword_blocks, number, place
+from .deck_lines import Keyword, integer, keyword_blocks, place_of
 
 _SOLIDS = {k.n_nodes: name for name, k in BY_NAME.items() if k.dim == 3 and k.abaqus}
 _SURFACES = {kind.n_nodes: name for name, kind in BY_NAME.items() if kind.dim == 2}
@@ -121,10 +121,10 @@ class _Deck:
     def _take_nodes(self, block: Keyword) -> None:
         members = _Set()
         for line in block.lines:
-            n = number(line, 0)
+            n = integer(line, 0)
             if n in self.nodes:
                 raise line.refusal("*NODE", n, "two nodes have this number")
-            self.nodes[n] = place(line, block.options.get("SYSTEM", "R").upper(), block)
+            self.nodes[n] = place_of(line, block.options.get("SYSTEM", "R").upper(), block)
             members.numbers[n] = line.where
         if "NSET" in block.options:
             self.node_sets[self._key(block.options["NSET"])].add(members)
@@ -138,7 +138,7 @@ class _Deck:
         size = cell.n_nodes + 1
         if len(flat) % size:
             raise block.refusal(f"each {kind} must have {cell.n_nodes} nodes")
-        numbers = [number(line, i) for line, i in flat]
+        numbers = [integer(line, i) for line, i in flat]
         members = _Set()
         for start in range(0, len(flat), size):
             line, n, nodes = flat[start][0], numbers[start], numbers[start + 1 : start + size]
@@ -170,8 +170,8 @@ class _Deck:
         members = sets[self._key(name)]
         for line in block.lines:
             if "GENERATE" in block.options:
-                first, last = (number(line, i) for i in (0, 1))
-                step = number(line, 2) if len(line.fields) > 2 else 1
+                first, last = (integer(line, i) for i in (0, 1))
+                step = integer(line, 2) if len(line.fields) > 2 else 1
                 if not step or (last - first) % step or (last - first) // step < 0:
                     allowed = "the increment must lead from the first number to the last"
                     raise line.refusal(f"set {name}", step, allowed)
@@ -181,7 +181,7 @@ class _Deck:
                 if entry.upper() in sets:
                     members.add(sets[entry.upper()])
                 elif entry.lstrip("+-").isdigit() or not entry:
-                    members.numbers[number(line, i)] = line.where
+                    members.numbers[integer(line, i)] = line.where
                 else:
                     raise line.refusal(f"set {name}", entry, "no such set above it")
 
@@ -241,7 +241,7 @@ class _Deck:
         return found
 
     def _refuse_strangers(
-        self, name: str, members: _Set, known: dict[int, object], what: str
+        self, name: str, members: _Set, known: Collection[int], what: str
     ) -> None:
         for n, where in members.numbers.items():
             if n not in known:
@@ -266,7 +266,7 @@ class _Deck:
             if owner.upper() in self.cell_sets:
                 numbers = sorted(self.cell_sets[owner.upper()].among(self.cells))
             elif owner.isdigit():
-                numbers = [number(line, 0)]
+                numbers = [integer(line, 0)]
             else:
                 raise line.refusal(key, owner, "no such set of cells")
             for n in numbers:

@@ -37,19 +37,81 @@ READ: dict[str, tuple[str, ...]] = {
 }
 # Sections are looked at for the cells that they belong to.
 IGNORED = frozenset(
-    """
-    HEADING PREPRINT RESTART NODEPRINT NODEFILE ELPRINT ELFILE NODEOUTPUT ELEMENTOUTPUT OUTPUT
-    MATERIAL ELASTIC PLASTIC DENSITY EXPANSION CONDUCTIVITY SPECIFICHEAT DAMPING HYPERELASTIC
-    HYPERFOAM VISCOELASTIC CREEP RATEDEPENDENT CYCLICHARDENING USERMATERIAL DEPVAR DAMAGEINITIATION
-    DAMAGEEVOLUTION POTENTIAL UNIAXIALTESTDATA BIAXIALTESTDATA PLANARTESTDATA ORIENTATION TRANSFORM
-    DISTRIBUTION DISTRIBUTIONTABLE SOLIDSECTION SHELLSECTION SHELLGENERALSECTION MEMBRANESECTION
-    SURFACESECTION BEAMSECTION BEAMGENERALSECTION SECTIONCONTROLS HOURGLASSSTIFFNESS
-    TRANSVERSESHEARSTIFFNESS NODALTHICKNESS AMPLITUDE TIMEPOINTS PHYSICALCONSTANTS BOUNDARY
-    INITIALCONDITIONS SURFACEINTERACTION SURFACEBEHAVIOR FRICTION CONTACT CONTACTPAIR
-    CONTACTINCLUSIONS CONTACTEXCLUSIONS CONTACTPROPERTYASSIGNMENT SURFACEPROPERTYASSIGNMENT
-    CONTACTINITIALIZATIONASSIGNMENT CONTACTDAMPING CONTACTCONTROLS GAPCONDUCTANCE GAPHEATGENERATION
-    CLOAD DLOAD DSLOAD TEMPERATURE STEP ENDSTEP STATIC
-    """.split()
+    [
+        "HEADING",
+        "PREPRINT",
+        "RESTART",
+        "NODEPRINT",
+        "NODEFILE",
+        "ELPRINT",
+        "ELFILE",
+        "NODEOUTPUT",
+        "ELEMENTOUTPUT",
+        "OUTPUT",
+        "MATERIAL",
+        "ELASTIC",
+        "PLASTIC",
+        "DENSITY",
+        "EXPANSION",
+        "CONDUCTIVITY",
+        "SPECIFICHEAT",
+        "DAMPING",
+        "HYPERELASTIC",
+        "HYPERFOAM",
+        "VISCOELASTIC",
+        "CREEP",
+        "RATEDEPENDENT",
+        "CYCLICHARDENING",
+        "USERMATERIAL",
+        "DEPVAR",
+        "DAMAGEINITIATION",
+        "DAMAGEEVOLUTION",
+        "POTENTIAL",
+        "UNIAXIALTESTDATA",
+        "BIAXIALTESTDATA",
+        "PLANARTESTDATA",
+        "ORIENTATION",
+        "TRANSFORM",
+        "DISTRIBUTION",
+        "DISTRIBUTIONTABLE",
+        "SOLIDSECTION",
+        "SHELLSECTION",
+        "SHELLGENERALSECTION",
+        "MEMBRANESECTION",
+        "SURFACESECTION",
+        "BEAMSECTION",
+        "BEAMGENERALSECTION",
+        "SECTIONCONTROLS",
+        "HOURGLASSSTIFFNESS",
+        "TRANSVERSESHEARSTIFFNESS",
+        "NODALTHICKNESS",
+        "AMPLITUDE",
+        "TIMEPOINTS",
+        "PHYSICALCONSTANTS",
+        "BOUNDARY",
+        "INITIALCONDITIONS",
+        "SURFACEINTERACTION",
+        "SURFACEBEHAVIOR",
+        "FRICTION",
+        "CONTACT",
+        "CONTACTPAIR",
+        "CONTACTINCLUSIONS",
+        "CONTACTEXCLUSIONS",
+        "CONTACTPROPERTYASSIGNMENT",
+        "SURFACEPROPERTYASSIGNMENT",
+        "CONTACTINITIALIZATIONASSIGNMENT",
+        "CONTACTDAMPING",
+        "CONTACTCONTROLS",
+        "GAPCONDUCTANCE",
+        "GAPHEATGENERATION",
+        "CLOAD",
+        "DLOAD",
+        "DSLOAD",
+        "TEMPERATURE",
+        "STEP",
+        "ENDSTEP",
+        "STATIC",
+    ]
 )
 # What of an ignored keyword would move nodes all the same.
 _MOVING = {("CONTACTPAIR", "ADJUST"), ("CONTACTPAIR", "TIED")}
@@ -137,33 +199,38 @@ def _check_ignored(block: Keyword, in_step: bool) -> None:
 def _blocks(path: Path, job: Path, inside: tuple[Path, ...]) -> Iterator[Keyword]:
     """The blocks of a file and of those it includes; `job`: the folder that names start from."""
     block: Keyword | None = None
-    head = ""
+    for row, line in _whole_lines(path):
+        if not line.startswith("*"):
+            if block is None:
+                raise InputError(f"{path}, line {row}", "data", line, "stands under no keyword")
+            block.lines.append(DataLine(path, row, _fields(line)))
+            continue
+        if block:
+            yield block
+        block = _keyword(path, row, line)
+        if block.keyword == "INCLUDE":
+            yield from _blocks(*_included(block, job, inside))
+            block = None
+    if block:
+        yield block
+
+
+def _whole_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """The lines of a file without comments, each keyword line with those that it goes on in."""
+    head, start = "", 0
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
     for row, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()
         if not line or line.startswith("**"):
             continue
-        if head or line.startswith("*"):
-            if not head:
-                if block:
-                    yield block
-                start = row
-            head += line
-            if head.endswith(","):
-                continue
-            block = _keyword(path, start, head)
-            head = ""
-            if block.keyword == "INCLUDE":
-                yield from _blocks(*_included(block, job, inside))
-                block = None
+        start = start if head else row
+        head += line
+        if head.startswith("*") and head.endswith(","):
             continue
-        if block is None:
-            raise InputError(f"{path}, line {row}", "data", line, "stands under no keyword")
-        block.lines.append(DataLine(path, row, _fields(line)))
+        yield start, head
+        head = ""
     if head:
         raise InputError(f"{path}, line {start}", "keyword", head, "does not end")
-    if block:
-        yield block
 
 
 def _keyword(path: Path, row: int, head: str) -> Keyword:
@@ -226,10 +293,10 @@ _INCLUDED = re.compile(
 )
 
 
-def number(line: DataLine, i: int) -> int:
+def integer(line: DataLine, i: int) -> int:
     """The whole number in a field of a line; InputError for anything else.
 
-    >>> number(DataLine(Path("deck.inp"), 3, ["7"]), 0)
+    >>> integer(DataLine(Path("deck.inp"), 3, ["7"]), 0)
     7
     """
     text = line.fields[i] if i < len(line.fields) else ""
@@ -238,12 +305,12 @@ def number(line: DataLine, i: int) -> int:
     return int(text)
 
 
-def place(line: DataLine, system: str, block: Keyword) -> list[float]:
+def place_of(line: DataLine, system: str, block: Keyword) -> list[float]:
     """The place x, y, z of a node, whose number is the first field; a blank coordinate is zero.
 
     `system`: R, or C: radius, angle in degrees, z. Exponents may be written with D.
 
-    >>> place(DataLine(Path("deck.inp"), 3, ["7", "", "-5.0D-1"]), "R", None)
+    >>> place_of(DataLine(Path("deck.inp"), 3, ["7", "", "-5.0D-1"]), "R", None)
     [0.0, -0.5, 0.0]
     """
     found = []

@@ -10,8 +10,8 @@ from scipy import sparse
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
-from ...lac.status import StatusResult, Trial, find_status
 from ...lac.motions import rigid_motions, unsupported
+from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.symmetric_blocks import Stiffness
 from ...mechanics.linear.systems import Compliance, Systems, parts_of

@@ -87,8 +87,7 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
 
 
 class _Missed(NamedTuple):
-    """By macro-element (m,): the mean over neighbours of what facets add to a gap, and how far
-    facets of both sides miss their surfaces."""
+    """By macro-element (m,): what facets add to a gap, a mean over neighbours, and their depth."""
 
     gap: np.ndarray
     depth: np.ndarray
@@ -110,7 +109,9 @@ def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
         return None  # the facets of both sides lie on one another
     number = np.concatenate([block.number for block in zone.slave_faces])
     faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in zone.slave_faces]
-    around = vertex_neighbours(faces, zone.count).astype(float) @ sparse.diags(operator.surface.area)
+    around = vertex_neighbours(faces, zone.count).astype(float) @ sparse.diags(
+        operator.surface.area
+    )
     by_macro = np.zeros((2, zone.count))
     by_macro[:, number] = rise, depth
     gap = around @ by_macro[0] / np.asarray(around.sum(axis=1)).ravel()

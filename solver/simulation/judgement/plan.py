@@ -7,24 +7,19 @@ result file and in the report; `docs/plan.md` describes all of them, with the ti
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy import sparse
 
-from ...case.model import Case
-from ...lac.cells.catalogue import CellType, cell_type
-from ...lac.cells.faces import circumference
 from ...lac.cut import needs_cut
-from ...lac.pairing import candidate_pairs
-from ...lac.threads import prefetch
 from ...mechanics.fem.mixed import AUTOMATIC_ABOVE
-from ...mechanics.fem.stress import largest_strain
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
 from ..options import Options
-from ..results.solution import Line, Solution, Validity
+from ..results.solution import Line, Solution
 from ..scene.bodies import body_names
 from ..scene.scene import Scene, ZoneScene
 
+# Up to this coefficient of friction no other states are looked for.
+_UNIQUE = 1.0
 # An estimated error below this is rounding.
 _ROUNDING = 1e-10
 
@@ -105,17 +100,20 @@ def plan_notes(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterat
     if scene.options.shortcuts.status and len(different) < len(states):
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
-    yield from _friction(states)
+    yield from _friction(max((z.zone.friction for z in scene.zones), default=0.0), states)
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
 
 
-def _friction(states: Sequence[Equilibrium]) -> Iterator[Line]:
+def _friction(largest: float, states: Sequence[Equilibrium]) -> Iterator[Line]:
     """What is certain about a state with friction, and what is not."""
     rates = [state.friction.contraction for state in states if state.friction]
     if not rates:
         return
     path = "one step from rest" if len(rates) == 1 else f"a path of {len(rates)} steps from rest"
     yield Line(f"friction: {path}", "the state depends on the order and the size of the steps")
+    if largest > _UNIQUE:
+        what = f"friction: for a coefficient of {largest:g} other states may exist"
+        yield Line(what, "of those found, most of the contact stays closed in this one")
     if max(rates) > 0:
         what = f"friction: bounds of slip contract to {max(rates):.2g} of their error by iteration"
         only = "the state is the only one nearby; for a large coefficient there may be others"

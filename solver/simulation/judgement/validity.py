@@ -39,8 +39,9 @@ def inside_others(
     """How many cells have their middle inside a cell of another body.
 
     `cells` by type (n, n_nodes) on `points` (n_points, dim), `body` (n_points,) a number from zero
-    on, `apart` (b, b) pairs of bodies whose meshes do not show where they are. Faces of cells are taken as plane. Bodies that touch, and faces of curved surfaces that
-    overlap a little, count as apart: it takes about half a cell.
+    on, `apart` (b, b) pairs of bodies whose meshes do not show where they are. Faces of cells are
+    taken as plane. Bodies that touch, and faces of curved surfaces that overlap a little, count as
+    apart: it takes about half a cell.
 
     Two squares of edge 1 overlap by less than half a cell, then by more:
 
@@ -133,7 +134,13 @@ _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
 _NOTED_FACETS, _FACETS, _NOTED_DEPTH, _DEPTH = 1e-2, 0.1, 0.1, 2.0
 # The checks of a pressure along the surface whose tolerance may be wider.
-OF_PRESSURE = ("multiplier", "pressure_l2", "pressure_means", "pressure_max", "pressure_oscillation")
+OF_PRESSURE = (
+    "multiplier",
+    "pressure_l2",
+    "pressure_means",
+    "pressure_max",
+    "pressure_oscillation",
+)
 
 
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
@@ -251,7 +258,8 @@ def remarks(found: Validity) -> Iterator[Line]:
         yield Line(what, "their pressure is the mean over the part that it covers")
     if found.facets > _NOTED_FACETS or found.facet_depth > _NOTED_DEPTH:
         what = f"facets of curved surfaces change the pressure by about {found.facets:.1%}"
-        why = f"they are {found.facet_depth:.2g} times as deep as the bodies close, or as the gap that is left"
+        deep = f"{found.facet_depth:.2g}"
+        why = f"they are {deep} times as deep as the bodies close, or as the gap that is left"
         yield Line(what, why)
     if found.unpaired > _NOTED_UNPAIRED:
         what = f"{found.unpaired:.1%} of a macro-element lies opposite the master without a partner"

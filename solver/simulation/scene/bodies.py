@@ -16,8 +16,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ...mechanics.fem.bodies import joined_bodies, nodes_of_unknowns
 from ...lac.motions import rigid_motions, support_resistance, unheld_motion
+from ...mechanics.fem.bodies import joined_bodies, nodes_of_unknowns
 from ...mechanics.fem.supports import FreeMotion
 from ...system.errors import InputError
 from .cut_groups import unit_springs

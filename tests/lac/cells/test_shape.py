@@ -63,15 +63,15 @@ def test_weights_sum_to_the_volume_of_the_reference_cell(name):
     assert (weights > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("dim", "degree"), [(d, k) for d in (1, 2, 3) for k in range(1, 9)]
-)
+@pytest.mark.parametrize(("dim", "degree"), [(d, k) for d in (1, 2, 3) for k in range(1, 9)])
 def test_simplex_rules_integrate_monomials(dim, degree):
     points, weights = simplex_rule(dim, degree)
     for powers in product(range(degree + 1), repeat=dim):
         if sum(powers) <= degree:
             exact = prod(map(factorial, powers)) / factorial(sum(powers) + dim)
-            assert weights @ (points ** np.array(powers)).prod(axis=1) == pytest.approx(exact, rel=1e-12)
+            assert weights @ (points ** np.array(powers)).prod(axis=1) == pytest.approx(
+                exact, rel=1e-12
+            )
 
 
 def test_tetrahedron_rules_of_higher_degrees_are_refused():

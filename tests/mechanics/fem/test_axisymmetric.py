@@ -7,10 +7,10 @@ from scipy import sparse
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.cells.faces import surface_points
 from solver.lac.facets import facets
+from solver.lac.motions import rigid_motions, support_resistance, unheld_motion
 from solver.lac.operator import gap_operator
 from solver.lac.reconstruction import FORMS, vertex_neighbours
 from solver.lac.recovery import RecoveryRequest
-from solver.lac.motions import rigid_motions, support_resistance, unheld_motion
 from solver.mechanics.fem.elasticity import (
     Block,
     internal_force,

@@ -212,7 +212,7 @@ def test_mirrored_cells_are_turned(tmp_path):
         (" 99, 7., 7., 7.\n", " 5, 7., 7., 7.\n", "*NODE = 5: two nodes have this number"),
         (" 202, 11, 13", " 100, 11, 13", "*ELEMENT = 100: two cells have this number"),
         (" 202, 11, 13", " 201, 11, 13", "*ELEMENT = 201: two cells have this number"),
-        ],
+    ],
 )
 def test_refusals(old, new, message, tmp_path):
     assert old in DECK
@@ -237,7 +237,7 @@ def test_refusals(old, new, message, tmp_path):
         ("*NSET, NSET=pins", "*NSET,\n** comment\nNSET=pins"),
         ("200, 202, 2", "202, 200, -2"),
         ("200, 202, 2", "202, 202"),
-        ("*SURFACE, TYPE=ELEMENT, NAME=slave\n lower, S2", "*SURFACE, NAME=slave\n \"lower\", s2"),
+        ("*SURFACE, TYPE=ELEMENT, NAME=slave\n lower, S2", '*SURFACE, NAME=slave\n "lower", s2'),
         (" pins, 5", ' "PINS" , 5,'),
         ("*ELSET, ELSET=both\n lower, UPPER", '*ELSET, ELSET="both"\n "lower", "UPPER"'),
         ("*STATIC", "*VISCO\n1., 1."),
