@@ -15,6 +15,10 @@ _SHOWN = 5
 _PLANE = 1e-9
 
 
+# Mid-nodes are at most so many halves of their edge away from its middle: as far as its ends.
+_FARTHEST = 1.0
+
+
 def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
     """One block per cell type, volumes first, right side out; 2D points in two columns.
 
@@ -35,6 +39,7 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
     blocks = _attached(blocks, dim, len(points), where)
     for block in blocks:
         if block.cell.dim == dim:
+            block.check_middles(points, where)
             block.turn(points, where)
     return _compact(points, blocks, names, table.node_groups)
 
@@ -53,6 +58,25 @@ class _CellBlock:
 
     def named(self) -> np.ndarray:
         return np.any([np.zeros(len(self.nodes), dtype=bool), *self.groups.values()], axis=0)
+
+    def check_middles(self, points: np.ndarray, where: object) -> None:
+        """InputError where mid-nodes lie farther from the middle of their edge than its ends."""
+        if self.cell.order < 2:
+            return
+        ends = points[self.nodes[:, np.array(self.cell.edges)]]
+        n = self.cell.n_vertices
+        middles = points[self.nodes[:, n : n + len(self.cell.edges)]]
+        away = np.linalg.norm(middles - ends.mean(axis=2), axis=2)
+        half = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2) / 2
+        bad = (away > _FARTHEST * half).any(axis=1)
+        if bad.any():
+            raise InputError(
+                where,
+                _numbered(self.cell, self.number[bad]),
+                None,
+                "mid-nodes in the wrong order: some are not between the ends of their edge "
+                "(docs/formats.md has the node orders)",
+            )
 
     def turn(self, points: np.ndarray, where: object) -> None:
         self.nodes, bad = right_side_out(points, self.nodes, self.cell)

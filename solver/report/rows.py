@@ -11,7 +11,16 @@ from typing import Any
 
 from ..lac.cells.catalogue import BY_NAME
 from ..system.errors import InputError
-from ..verification.verdict import CRASHED, NUMBERS, WORDS, Body, Verdict, read_verdict, unbound
+from ..verification.verdict import (
+    CRASHED,
+    NUMBERS,
+    VECTORS,
+    WORDS,
+    Body,
+    Verdict,
+    read_verdict,
+    unbound,
+)
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,12 @@ class Row:
         """
         compared = [check for check in self.verdict.checks if check.verifies]
         if compared and all(check.name in NUMBERS for check in compared):
-            return "; ".join(f"{c.name} compared with {c.reference:g}" for c in compared)
+            return "; ".join(
+                f"{c.name} compared with a stated vector"
+                if c.name in VECTORS
+                else f"{c.name} compared with {c.reference:g}"
+                for c in compared
+            )
         kind, code = self.verdict.reference_kind or "", self.verdict.reference_code
         named = f": {code.get('name')} {code.get('version')}" if code else ""
         return f"{kinds.get(kind, kind)}{named}"

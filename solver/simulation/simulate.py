@@ -64,7 +64,10 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
             if case.frictional:
                 from .equilibrium.friction_recovery import solve_and_recover  # friction alone
 
-                state, field = solve_and_recover(problem, step, last)
+                try:
+                    state, field = solve_and_recover(problem, step, last)
+                except SolveError as error:
+                    raise SolveError(f"{_called(step, factor)}: {error}") from None
             else:
                 before = case.steps[len(states) - 1] if states else None
                 state = problem.solve(step, last.status.closed if last else None, before=before)

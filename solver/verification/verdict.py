@@ -34,6 +34,8 @@ NUMBERS = (
     *("displacement_at", "stress_at", "pressure_at"),
 )
 """The checks of single numbers."""
+VECTORS = ("force", "reaction", "moment", "displacement_at", "stress_at")
+"""Those of them that have a number for each component."""
 T = TypeVar("T")
 _DIGEST = "digest"
 

@@ -17,7 +17,6 @@ from tests.faults.patches import (
     every_third_off,
     factor_of_half,
     first_guess_kept,
-    first_kept,
     first_nodes_exchanged,
     first_scaled,
     first_status_kept,
@@ -33,6 +32,7 @@ from tests.faults.patches import (
     never_closes,
     never_closing,
     normals_rolled,
+    of_each_row,
     one_dropped,
     rolled_sub_faces,
     shared_nodes_free,
@@ -66,6 +66,7 @@ STIFF, OBSTACLE = "waves/stiff-quad4", "hertz/plane-obstacle"
 STUCK, SLIDING, STEPWISE = (f"friction-patch/{n}" for n in ("n-stick", "e-slip", "two-steps"))
 UNLOADED, PULLED = "friction/unloaded-quad8", "friction/pulled-quad8"
 RIGHT, RECOVERED = "friction-patch/t-slip", "friction/sliding-recovered"
+SPATIAL = "friction-patch/v-slip"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 
@@ -283,11 +284,11 @@ MUTANTS = (
     Mutant("open-slips", "integrals of slip are not closed on bent faces", STUCK,
            "lac.operator:slip_operator",
            given(lambda parts, *rest: ([integrals_of(part) for part in parts], *rest))),
-    Mutant("slip-direction", "friction pulls along the slip", SLIDING,
-           "simulation.equilibrium.friction:following",
-           changed(lambda found: (replace(found[0], direction=-found[0].direction), found[1]))),
-    Mutant("bound-kept", "the bound of friction stays that of the first step", STEPWISE,
-           "simulation.equilibrium.friction:Search._bounds", first_kept),
+    Mutant("slip-direction", "the tangents of a face have units of their own in the law", SPATIAL,
+           "mechanics.mortar.coulomb:CoulombContact.__init__", of_each_row),
+    Mutant("bound-halved", "the bound of friction is that of half the coefficient", STEPWISE,
+           "mechanics.mortar.coulomb:CoulombContact.__init__",
+           given(lambda contact, s, friction, *of: (contact, s, friction / 2, *of))),
     Mutant("slip-history", "slip is counted from the undeformed state in each step", UNLOADED,
            "simulation.equilibrium.problem:ContactProblem.count_slip_from",
            given(lambda problem, jump: (problem, 0 * jump))),

@@ -217,14 +217,12 @@ def integrals_of(part: Any) -> Any:
     return integrals(space, part.segments)
 
 
-def first_kept(true: Wrapped) -> Wrapped:
-    """The first result that is more than zero, whatever comes later."""
-    kept: list[Any] = []
+def of_each_row(true: Wrapped) -> Wrapped:
+    """A contact whose law takes the stiffness of each row, also of tangents."""
 
-    def faulty(*arguments: Any) -> Any:
-        found = true(*arguments)
-        if not kept and np.any(found):
-            kept.append(found)
-        return kept[0] if kept else found
+    def init(contact: Any, stiffness: np.ndarray, *others: Any) -> None:
+        true(contact, stiffness, *others)
+        contact.c = np.abs(np.diag(stiffness))
+        contact._slope = contact.stiffness - np.diag(contact.c)
 
-    return faulty
+    return init

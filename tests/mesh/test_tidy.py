@@ -135,3 +135,14 @@ def test_a_group_whose_faces_touch_no_cell_is_empty_unless_it_is_a_rigid_body():
     )
     with pytest.raises(InputError, match="'loose': is empty, or none of its members touches a vol"):
         build_scene(parse_case(text, Path("a.yaml")), mesh)
+
+
+@pytest.mark.parametrize("order", [[5, 6, 7, 4], [7, 4, 5, 6], [6, 5, 4, 7]])
+def test_mid_nodes_in_the_wrong_order_are_named(order):
+    points = [*SQUARE, [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]]
+    body = {"body": [np.array([0])]}
+    right = meshio.Mesh(points, [("quad8", [[0, 1, 2, 3, 4, 5, 6, 7]])], cell_sets=body)
+    assert len(tidy(right, "mesh").cells) == 1
+    wrong = meshio.Mesh(points, [("quad8", [[0, 1, 2, 3, *order]])], cell_sets=body)
+    with pytest.raises(InputError, match="QUAD8 1: mid-nodes in the wrong order"):
+        tidy(wrong, "mesh")

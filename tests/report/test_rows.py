@@ -15,9 +15,9 @@ def row(*checks):
 
 
 def test_a_number_is_no_exact_solution():
-    assert row(("force", 12.5)).origin(KINDS) == "force compared with 12.5"
+    assert row(("force", 12.5)).origin(KINDS) == "force compared with a stated vector"
     both = row(("force", 12.5), ("contact_area", 3.0)).origin(KINDS)
-    assert both == "force compared with 12.5; contact_area compared with 3"
+    assert both == "force compared with a stated vector; contact_area compared with 3"
 
 
 def test_a_field_is_compared_with_an_exact_solution():

@@ -2,14 +2,18 @@
 
 from dataclasses import replace
 
+import gmsh
+import meshio
 import numpy as np
 import pytest
 
+from solver import solve_case
 from solver.lac import operator
 from solver.lac.pairing import candidate_pairs
 from solver.simulation.equilibrium import constraints
 from solver.simulation.equilibrium.constraints import first_guess, moved
 from solver.simulation.equilibrium.problem import ContactProblem
+from solver.system.errors import InputError
 from tests.simulation.test_rough_statuses import sphere
 
 
@@ -104,3 +108,56 @@ def test_a_receding_contact_starts_from_the_last_status(problem):
     start = np.arange(len(constraints.initial)) % 3 == 0
     found = moved(start, 0.3, 1.0, problem.scene, constraints, lambda closed: "")
     np.testing.assert_array_equal(found, start)
+
+
+def pin(size: float) -> meshio.Mesh:
+    """A pin through the hole of a lug, both of TETRA4."""
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Verbosity", 1)
+        shapes = gmsh.model.occ
+        block = shapes.addBox(-25, -25, 0, 50, 65, 5)
+        bore = shapes.addCylinder(0, 0, 0, 0, 0, 5, 10)
+        [(_, lug)], _ = shapes.cut([(3, block)], [(3, bore)])
+        shank = shapes.addCylinder(0, 0.05, 0, 0, 0, 5, 9.95)
+        shapes.synchronize()
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.model.mesh.generate(3)
+        _, places, _ = gmsh.model.mesh.getNodes()
+        cells = {}
+        for name, volume in (("lug", lug), ("pin", shank)):
+            _, _, [nodes] = gmsh.model.mesh.getElements(3, volume)
+            cells[name] = nodes.reshape(-1, 4).astype(int) - 1
+    finally:
+        gmsh.finalize()
+    count = [len(cells["lug"]), len(cells["pin"])]
+    sets = {"lug": [np.arange(count[0])], "pin": [count[0] + np.arange(count[1])]}
+    points = places.reshape(-1, 3)
+    return meshio.Mesh(points, [("tetra", np.concatenate(list(cells.values())))], cell_sets=sets)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_facets_alone_hold_no_body(held):
+    """A hole of TETRA4 is rough: along its axis and around it, a smooth one would not hold."""
+    case = {
+        "name": "pin",
+        "materials": {"all": {"young": 70000.0, "poisson": 0.33}},
+        "groups": {
+            "top": {"within": "lug", "plane": {"point": [0, 40, 0], "normal": [0, 1, 0]}},
+            "ends": {"within": "pin", "plane": {"point": [0, 0, 0], "normal": [0, 0, 1]}},
+            "hole": {"within": "lug", "where": "1e-3 - abs(sqrt(x * x + y * y) - 10)"},
+            "shank": {
+                "within": "pin",
+                "where": "1e-3 - abs(sqrt(x * x + (y - 0.05) * (y - 0.05)) - 9.95)",
+            },
+        },
+        "supports": [{"group": "ends", "fix": ["x", "y", "z"]}],
+        "loads": [{"group": "top", "force": [0, 2000.0, 0]}],
+        "contact": [{"slave": "hole", "master": "shank"}],
+    }
+    if held:
+        case["supports"].append({"group": "top", "fix": ["x", "z"]})
+        assert solve_case(case, pin(5.0)).verdict == "unreliable"  # its facets are too deep
+        return
+    with pytest.raises(InputError, match="nothing keeps lug from a free motion"):
+        solve_case(case, pin(5.0))

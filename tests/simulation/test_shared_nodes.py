@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solver import solve_case
 from solver.case.reader import parse_case
 from solver.mechanics.linear.choice import force_solver
 from solver.simulation.judgement.validity import meshed
@@ -17,6 +18,7 @@ from solver.verification.run import mesh_of
 from tests.faults.planted import CASES
 from tests.scenes import block_mesh, changed_case, solved
 
+BLOCK = {"cells": "QUAD4", "divisions": [2, 2]}
 CORNER = (CASES / "shared/corner-quad4-tria6.yaml").read_text(encoding="utf-8")
 CHAIN = """\
 name: chain
@@ -178,3 +180,39 @@ contact:
     kept = meshed(scene)
     assert len(kept["TRIA3"]) == 0
     assert len(kept["QUAD4"]) == len(scene.mesh.cells["QUAD4"])
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_bodies_with_nodes_at_the_same_places_and_no_zone_are_noted(joined):
+    """Two halves of a body whose nodes were not merged: they are apart."""
+    halves = ["left", "left" if joined else "right"]
+    low = [
+        {"name": name, "low": [x, -1], "high": [x + 0.5, 0], "block": BLOCK}
+        for name, x in zip(halves, (0, 0.5), strict=True)
+    ]
+    on_top = {"point": [0, 0], "normal": [0, 1]}
+    found = solve_case(
+        {
+            "name": "seam",
+            "mesh": {
+                "recipe": "bricks",
+                "bricks": [*low, {"name": "up", "low": [0, 0], "high": [1, 1], "block": BLOCK}],
+            },
+            "plane": "strain",
+            "materials": {"all": {"young": 1000.0, "poisson": 0.3}},
+            "groups": {
+                "floor": {"of": "nodes", "plane": {"point": [0, -1], "normal": [0, 1]}},
+                "sides": {"of": "nodes", "plane": {"point": [0, 0], "normal": [1, 0]}},
+                "press": {"plane": {"point": [0, 1], "normal": [0, 1]}},
+                "ub": {"within": "up", "plane": on_top},
+                "lt": {"within": sorted(set(halves)), "plane": on_top},
+            },
+            "supports": [{"group": "floor", "fix": ["x", "y"]}, {"group": "sides", "fix": ["x"]}],
+            "loads": [{"group": "press", "pressure": 10.0}],
+            "contact": [{"slave": "ub", "master": "lt"}],
+        }
+    )
+    told = [line.what for line in found.solution.plan if "at the same places" in line.what]
+    assert told == (
+        [] if joined else ["3 nodes of left and right at the same places, and no zone there"]
+    )

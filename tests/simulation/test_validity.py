@@ -5,6 +5,7 @@ import pytest
 
 import solver.lac.threads
 import solver.simulation.judgement.validity
+from solver import solve_case
 from solver.lac.cells.catalogue import BY_NAME
 from solver.simulation.judgement import validity
 from solver.simulation.judgement.validity import inside_others
@@ -132,3 +133,28 @@ def test_layers_of_cells_in_one_another(monkeypatch, many, layers, threads):
     both = {"HEXA8": np.concatenate([cells, cells + len(points)])}
     body = np.repeat([0, 1], len(points))
     assert inside_others(np.concatenate([points, moved]), both, body) == 2 * 9 * layers
+
+
+def test_a_clearance_is_where_bodies_are_and_not_their_mesh():
+    """Meshed in touch, said to be 0.499 apart, moved by 0.5: p = E 0.001 / 4, nothing inside."""
+    found = solve_case(
+        {
+            "name": "apart",
+            "mesh": {
+                "recipe": "blocks",
+                "size": [4.0, 2.0],
+                "bottom": {"cells": "QUAD4", "divisions": [4, 1]},
+                "top": {"cells": "QUAD4", "divisions": [4, 8]},
+            },
+            "plane": "strain",
+            "materials": {"all": {"young": 100000.0, "poisson": 0.0}},
+            "supports": [
+                {"group": "base", "fix": ["x", "y"]},
+                {"group": "press", "fix": {"x": 0.0, "y": -0.5}},
+            ],
+            "contact": [{"slave": "top_contact", "master": "bottom_contact", "clearance": 0.499}],
+        }
+    )
+    assert found.pressure == pytest.approx(25.0, rel=1e-9)
+    assert found.verdict == "solved"
+    assert found.solution.validity.pushed_past == 0

@@ -73,6 +73,8 @@ def _assembled(
     mesh = plain_mesh(places, [(name, place_of(data)) for name, data in cells])
     fields = {}
     for name, (components, labels, values) in blocks.items():
+        if not np.isin(labels, numbers).all():
+            continue  # of nodes that the mesh has not, as of expanded ones in the plane
         nodes, given = place_of(labels), values[:, : len(components)]
         if name in _PARTIAL:
             given = np.zeros((len(places), given.shape[1]))

@@ -14,7 +14,7 @@ from ...lac.motions import rigid_motions, unsupported
 from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.symmetric_blocks import Stiffness
-from ...mechanics.linear.systems import Compliance, Systems, parts_of
+from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
 from ..scene.cut_groups import unit_springs
 from ..scene.scene import Scene
@@ -29,6 +29,7 @@ from .constraints import (
     refuse_unsolvable,
 )
 from .iterate import ContactIterate, Displacement
+from .stabilised import compliance_of
 from .state import Equilibrium, estimate, judged, roughness, rounding
 
 _LOG = logging.getLogger(__name__)
@@ -93,7 +94,7 @@ class ContactProblem:
         self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
         stabilised = any(zone.zone.stabilised for zone in scene.zones)
-        soft = self._compliance if stabilised else None
+        soft = partial(compliance_of, scene, self.constraints.normal) if stabilised else None
         self._systems_of = partial(
             Systems,
             constraints=on_free,
@@ -354,20 +355,6 @@ class ContactProblem:
                 accuracy=accuracy,
                 correction=correction,
             )
-
-    def _compliance(self, closed: np.ndarray) -> Compliance:
-        """The compliance of the closed multipliers (k,); zones without one have no part of it."""
-        parts, weight = [], [np.empty(0)]
-        for zone in self.scene.zones:
-            mine, recovery = closed[zone.numbers], zone.operator.recovery
-            if zone.zone.stabilised and recovery and recovery.stabilisation:
-                parts.append(recovery.stabilisation.scatter(mine))
-                weight.append(recovery.stabilisation.weight[mine])
-            else:
-                parts.append(sparse.csr_matrix((0, int(mine.sum()))))
-        # Rows of slip do not give way.
-        parts.append(sparse.csr_matrix((0, int(closed[~self.constraints.normal].sum()))))
-        return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
 
     def _gap_stiffness(self, step: Step) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.

@@ -15,7 +15,7 @@ from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
 from ..options import Options
 from ..results.solution import Line, Solution
-from ..scene.bodies import body_names
+from ..scene.bodies import body_names, coincident
 from ..scene.scene import Scene, ZoneScene
 
 # Up to this coefficient of friction no other states are looked for.
@@ -37,6 +37,10 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
     if scene.mean.n_cells:
         why = f"nearly incompressible (Poisson's ratio above {AUTOMATIC_ABOVE:g}), or as chosen"
         yield Line(f"mixed form in {scene.mean.n_cells} cells", why)
+    for (a, b), count in coincident(scene).items():
+        names = body_names(scene)
+        what = f"{count} nodes of {names[a]} and {names[b]} at the same places, and no zone there"
+        yield Line(what, "bodies that share no nodes are apart: merge the nodes, or add a zone")
     yield from _cells(scene)
     for zone in scene.zones:
         yield from _zone(zone, scene, problem.constraints.inactive_multipliers)

@@ -113,6 +113,18 @@ def _refuse_unmerged(scene: Scene) -> None:
         raise InputError(scene.case.path, "mesh", None, allowed)
 
 
+def coincident(scene: Scene) -> dict[tuple[int, int], int]:
+    """How many nodes pairs of bodies have at the same places, where no zone is between them."""
+    pairs = cKDTree(scene.points).query_pairs(_ONE_PLACE * scene.length, output_type="ndarray")
+    bodies = np.sort(scene.body[pairs], axis=1).reshape(-1, 2)
+    sides = [(_bodies(scene, z.slave_faces), _bodies(scene, z.master_faces)) for z in scene.zones]
+    found: dict[tuple[int, int], int] = {}
+    for a, b in bodies[bodies[:, 0] != bodies[:, 1]].tolist():
+        if not any((a in s and b in m) or (b in s and a in m) for s, m in sides):
+            found[a, b] = found.get((a, b), 0) + 1
+    return found
+
+
 def without_unloaded(scene: Scene) -> Scene:
     """The scene without the cells and unknowns of such groups, and the cells of bodies held.
 

@@ -1,0 +1,24 @@
+"""Stabilised contact gives way to pressures that scatter (docs/slave-and-master.md)."""
+
+import numpy as np
+from scipy import sparse
+
+from ...mechanics.linear.systems import Compliance
+from ..scene.scene import Scene
+
+
+def compliance_of(scene: Scene, normal: np.ndarray, closed: np.ndarray) -> Compliance:
+    """The compliance of the closed rows (k,), of which those of gaps are `normal` (k,).
+
+    Zones without one have no part of it, and rows of slip do not give way.
+    """
+    parts, weight = [], [np.empty(0)]
+    for zone in scene.zones:
+        mine, recovery = closed[zone.numbers], zone.operator.recovery
+        if zone.zone.stabilised and recovery and recovery.stabilisation:
+            parts.append(recovery.stabilisation.scatter(mine))
+            weight.append(recovery.stabilisation.weight[mine])
+        else:
+            parts.append(sparse.csr_matrix((0, int(mine.sum()))))
+    parts.append(sparse.csr_matrix((0, int(closed[~normal].sum()))))
+    return Compliance(sparse.block_diag(parts, format="csr"), np.concatenate(weight))
