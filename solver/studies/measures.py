@@ -242,6 +242,7 @@ def results(point: Point) -> Record:
         "dofs": solution.dofs,
         "quantities": [asdict(one) for one in quantities(solution)],
         "pressure_error_estimate": solution.pressure_error_estimate,
+        "facet_depth": solution.validity.facet_depth,
     }
 
 

@@ -132,7 +132,9 @@ _NOTED_SLIP, _SMALL_SLIP = 0.1, 1.0
 # The same for a share of a macro-element that should have a partner.
 _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
-_NOTED_FACETS, _FACETS, _NOTED_DEPTH, _DEPTH = 1e-2, 0.1, 0.1, 2.0
+_NOTED_FACETS, _FACETS, _DEPTH = 1e-2, 0.1, 2.0
+NOTED_DEPTH = 0.1
+"""Deeper facets than this, in elastic closings, are worth a word."""
 # The checks of a pressure along the surface whose tolerance may be wider.
 OF_PRESSURE = (
     "multiplier",
@@ -256,7 +258,7 @@ def remarks(found: Validity) -> Iterator[Line]:
     if found.partly_covered:
         what = f"the master ends inside {found.partly_covered} macro-elements in contact"
         yield Line(what, "their pressure is the mean over the part that it covers")
-    if found.facets > _NOTED_FACETS or found.facet_depth > _NOTED_DEPTH:
+    if found.facets > _NOTED_FACETS or found.facet_depth > NOTED_DEPTH:
         what = f"facets of curved surfaces change the pressure by about {found.facets:.1%}"
         deep = f"{found.facet_depth:.2g}"
         why = f"they are {deep} times as deep as the bodies close, or as the gap that is left"

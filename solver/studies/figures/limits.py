@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 
 from ...report.charts import BLUE, INK, ORANGE, Axis, Chart, Look, level, series_chart
 from ...report.formats import error as shown_error
+from ...simulation.judgement.validity import NOTED_DEPTH
 from ..description import Study
 from ..page import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
 from ..theory import ROUND_OFF
@@ -223,6 +224,12 @@ def _table(points: Sequence[Mapping[str, Any]], found: Sequence[Limit]) -> Table
         order = observed_order(found[0].sizes[-3:], estimates[-3:]) if found else None
         shown = "" if order is None else f"{order:.2f}"
         rows.append(TableRow(["estimated pressure error", *map(shown_error, estimates), shown]))
+    depths = [point.get("facet_depth", 0.0) for point in points]
+    if max(depths) > NOTED_DEPTH:
+        row = ["depth of facets, in closings", *(f"{depth:.2g}" for depth in depths)]
+        rows.append(
+            TableRow([*row, *[""] * 5, "a mesh file keeps its facets: the limit is theirs"])
+        )
     head = ["Unknowns", *(str(point["dofs"]) for point in points)]
     return Table(
         [*head, "order", "limit", "± band", "factor", "exact", ""], rows, points[-1]["job"]
