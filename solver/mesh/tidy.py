@@ -39,8 +39,8 @@ def tidy(raw: meshio.Mesh, where: object) -> meshio.Mesh:
     blocks = _attached(blocks, dim, len(points), where)
     for block in blocks:
         if block.cell.dim == dim:
-            block.check_middles(points, where)
             block.turn(points, where)
+            block.check_middles(points, where)
     return _compact(points, blocks, names, table.node_groups)
 
 
