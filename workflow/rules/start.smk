@@ -71,10 +71,10 @@ def end_warm(server, folder):
 
 
 def leave_with_make():
-    """End as by Ctrl-C when the shell of `make` dies: TERM to make alone ends that shell alone."""
+    """End after the jobs at work when the shell of `make` dies: TERM to make ends that alone."""
     if sys.platform == "linux" and os.environ.pop("LEAVE_WITH_MAKE", ""):
         set_death_signal = 1
-        ctypes.CDLL(None).prctl(set_death_signal, signal.SIGINT)
+        ctypes.CDLL(None).prctl(set_death_signal, signal.SIGTERM)
 
 
 def begin(record):
