@@ -4,13 +4,15 @@
 documents it. The package is the kernel that the batch verifies. It needs NumPy, SciPy and
 scikit-fem, and nothing else of this program. Its files in the order of the method:
 
-- `contact`, `meshes`: the interface to scikit-fem; `cells`: cell types, shape functions, rules
+- `contact`, `arguments`, `saddle_point`, `meshes`: the interface to scikit-fem
+- `cells`: cell types, shape functions, rules
 - `cut`: slave cells are cut, so that each macro-element has a node inside
 - `facets`: geometry of faces, projection, directions of the gap
 - `pairing`, `clipping`, `regions`, `segments`: mortar segments and points on them
 - `partners`: the surface that a macro-element meets, and its area
 - `multipliers`, `operator`: the gap operator B, its sums as exact as the area
 - `friction`: Coulomb's law of each macro-element, and its slip
+- `motions`: rigid motions of bodies, and what resists them
 - `status`: which macro-elements are closed
 - `reconstruction`, `recovery`: a pressure of second order
 

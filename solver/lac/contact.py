@@ -178,8 +178,8 @@ class LocalAverageContact:
         self._unknown = np.zeros(0, dtype=int)
         operator = gap_operator(*self._surfaces)
         self._matrix = operator.matrix
-        near = vertex_neighbours([(whole.number, self._vertices)], count)
-        about = operator.surface.normal, operator.surface.area, near
+        self._near = vertex_neighbours([(whole.number, self._vertices)], count)
+        about = operator.surface.normal, operator.surface.area, self._near
         self._smooth = smoothed(operator.matrix, *about) if normal == "element" else self._matrix
         self._points, self._cells = points, {"slave": self.mesh.dofs.element_dofs.T}
         if not self._whole:
@@ -288,8 +288,7 @@ class LocalAverageContact:
         if form not in get_args(Recovered):
             raise ValueError(f"form = {form!r}: must be {', '.join(get_args(Recovered))}")
         shape = form_of(form, self._order, self._vertices.shape[1])
-        near = vertex_neighbours([(np.arange(len(self.area)), self._vertices)], len(self.area))
-        asked = RecoveryRequest(shape, near, np.zeros(len(self.area), dtype=int))
+        asked = RecoveryRequest(shape, self._near, np.zeros(len(self.area), dtype=int))
         recovery = gap_operator(*self._surfaces, asked=asked).recovery
         assert recovery is not None
         system, closed, size = state._system, state.closed, len(state._system.force)

@@ -19,6 +19,8 @@ _FREE = 1e-12
 _SMOOTH = 0.002
 # So often normals are averaged over neighbours.
 _ROUNDS = 3
+# Normals that differ by less are those of a flat surface.
+_BENT = 1e-9
 # Normals of neighbours that differ by less belong to one smooth surface.
 _KINK = np.cos(np.radians(40))
 
@@ -127,6 +129,8 @@ def smoothed(
 ) -> sparse.csr_matrix:
     """Rows of gaps (m, n_dofs) along the means of neighbours' normals, in space; else as they are.
 
+    So are those of a flat surface: the same object comes back.
+
     `normal` (m, dim), `area` (m,) of macro-elements, `near` (m, m) those that share a vertex.
 
     Two facets that lean to either side are level on the average:
@@ -147,6 +151,8 @@ def smoothed(
     for _ in range(_ROUNDS):
         mean = weight @ mean
         mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+    if np.abs(mean - normal).max() <= _BENT:
+        return gaps
     entries = gaps.tocoo()
     row, node, axis = entries.row, entries.col // dim, entries.col % dim
     shape = gaps.shape[0], gaps.shape[1] // dim

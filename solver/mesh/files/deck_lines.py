@@ -16,11 +16,12 @@ from pathlib import Path
 
 from ...system.errors import InputError
 
-# Options of the keywords that are read; the first ones are needed.
+# Options that a keyword cannot be without.
 _NEEDED: dict[str, tuple[str, ...]] = {
     "ELEMENT": ("TYPE",), "NSET": ("NSET",), "ELSET": ("ELSET",), "SURFACE": ("NAME",),
     "INCLUDE": ("INPUT",),
 }  # fmt: skip
+# The keywords that are read, with all options that are known.
 READ: dict[str, tuple[str, ...]] = {
     "NODE": ("NSET", "SYSTEM"),
     "ELEMENT": ("TYPE", "ELSET"),
@@ -36,107 +37,51 @@ READ: dict[str, tuple[str, ...]] = {
     "ENDASSEMBLY": (),
 }
 # Sections are looked at for the cells that they belong to.
-IGNORED = frozenset(
-    [
-        "HEADING",
-        "PREPRINT",
-        "RESTART",
-        "NODEPRINT",
-        "NODEFILE",
-        "ELPRINT",
-        "ELFILE",
-        "NODEOUTPUT",
-        "ELEMENTOUTPUT",
-        "OUTPUT",
-        "MATERIAL",
-        "ELASTIC",
-        "PLASTIC",
-        "DENSITY",
-        "EXPANSION",
-        "CONDUCTIVITY",
-        "SPECIFICHEAT",
-        "DAMPING",
-        "HYPERELASTIC",
-        "HYPERFOAM",
-        "VISCOELASTIC",
-        "CREEP",
-        "RATEDEPENDENT",
-        "CYCLICHARDENING",
-        "USERMATERIAL",
-        "DEPVAR",
-        "DAMAGEINITIATION",
-        "DAMAGEEVOLUTION",
-        "POTENTIAL",
-        "UNIAXIALTESTDATA",
-        "BIAXIALTESTDATA",
-        "PLANARTESTDATA",
-        "ORIENTATION",
-        "TRANSFORM",
-        "DISTRIBUTION",
-        "DISTRIBUTIONTABLE",
-        "SOLIDSECTION",
-        "SHELLSECTION",
-        "SHELLGENERALSECTION",
-        "MEMBRANESECTION",
-        "SURFACESECTION",
-        "BEAMSECTION",
-        "BEAMGENERALSECTION",
-        "SECTIONCONTROLS",
-        "HOURGLASSSTIFFNESS",
-        "TRANSVERSESHEARSTIFFNESS",
-        "NODALTHICKNESS",
-        "AMPLITUDE",
-        "TIMEPOINTS",
-        "PHYSICALCONSTANTS",
-        "BOUNDARY",
-        "INITIALCONDITIONS",
-        "SURFACEINTERACTION",
-        "SURFACEBEHAVIOR",
-        "FRICTION",
-        "CONTACT",
-        "CONTACTPAIR",
-        "CONTACTINCLUSIONS",
-        "CONTACTEXCLUSIONS",
-        "CONTACTPROPERTYASSIGNMENT",
-        "SURFACEPROPERTYASSIGNMENT",
-        "CONTACTINITIALIZATIONASSIGNMENT",
-        "CONTACTDAMPING",
-        "CONTACTCONTROLS",
-        "GAPCONDUCTANCE",
-        "GAPHEATGENERATION",
-        "CLOAD",
-        "DLOAD",
-        "DSLOAD",
-        "TEMPERATURE",
-        "STEP",
-        "ENDSTEP",
-        "STATIC",
-    ]
-)
+IGNORED = frozenset((
+    "HEADING", "PREPRINT", "RESTART", "NODEPRINT", "NODEFILE", "ELPRINT", "ELFILE", "NODEOUTPUT",
+    "ELEMENTOUTPUT", "OUTPUT", "MATERIAL", "ELASTIC", "PLASTIC", "DENSITY", "EXPANSION",
+    "CONDUCTIVITY", "SPECIFICHEAT", "DAMPING", "HYPERELASTIC", "HYPERFOAM", "VISCOELASTIC",
+    "CREEP", "RATEDEPENDENT", "CYCLICHARDENING", "USERMATERIAL", "DEPVAR", "DAMAGEINITIATION",
+    "DAMAGEEVOLUTION", "POTENTIAL", "UNIAXIALTESTDATA", "BIAXIALTESTDATA", "PLANARTESTDATA",
+    "ORIENTATION", "TRANSFORM", "DISTRIBUTION", "DISTRIBUTIONTABLE", "SOLIDSECTION",
+    "SHELLSECTION", "SHELLGENERALSECTION", "MEMBRANESECTION", "SURFACESECTION", "BEAMSECTION",
+    "BEAMGENERALSECTION", "SECTIONCONTROLS", "HOURGLASSSTIFFNESS", "TRANSVERSESHEARSTIFFNESS",
+    "NODALTHICKNESS", "AMPLITUDE", "TIMEPOINTS", "PHYSICALCONSTANTS", "BOUNDARY",
+    "INITIALCONDITIONS", "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CONTACT",
+    "CONTACTPAIR", "CONTACTINCLUSIONS", "CONTACTEXCLUSIONS", "CONTACTPROPERTYASSIGNMENT",
+    "SURFACEPROPERTYASSIGNMENT", "CONTACTINITIALIZATIONASSIGNMENT", "CONTACTDAMPING",
+    "CONTACTCONTROLS", "GAPCONDUCTANCE", "GAPHEATGENERATION", "CLOAD", "DLOAD", "DSLOAD",
+    "TEMPERATURE", "STEP", "ENDSTEP", "STATIC",
+))  # fmt: skip
 # What of an ignored keyword would move nodes all the same.
 _MOVING = {("CONTACTPAIR", "ADJUST"), ("CONTACTPAIR", "TIED")}
 # In a step, loads and outputs have many keywords; these change the model.
 _CHANGING = ("MODELCHANGE", "IMPERFECTION")
 # Input files within one another.
 _DEEPEST = 5
-_CONTINUED = re.compile(r'[^,"]*(?:"[^"]*"?[^,"]*)*')
 _INTEGER = re.compile(r"[+-]?\d{1,18}")
 _EXPONENT = str.maketrans("dD", "ee")
 _FULL_CIRCLE = 360.0
 
 
 @dataclass(frozen=True)
-class DataLine:
-    """A data line: its file and number, and its fields without blanks and quotes."""
+class _Placed:
+    """What stands in a row of a file."""
 
     file: Path
     row: int
-    fields: list[str]
 
     @property
     def where(self) -> str:
         """For messages."""
         return f"{self.file}, line {self.row}"
+
+
+@dataclass(frozen=True)
+class DataLine(_Placed):
+    """A data line: its fields without blanks and quotes."""
+
+    fields: list[str]
 
     def refusal(self, key: str, value: object, allowed: str) -> InputError:
         """A refusal of this line."""
@@ -144,11 +89,9 @@ class DataLine:
 
 
 @dataclass(frozen=True)
-class Keyword:
+class Keyword(_Placed):
     """A keyword without its blanks, its options, and its data lines."""
 
-    file: Path
-    row: int
     name: str
     options: dict[str, str]
     lines: list[DataLine] = field(default_factory=list)
@@ -157,11 +100,6 @@ class Keyword:
     def keyword(self) -> str:
         """The name in capitals, without blanks."""
         return "".join(self.name.upper().split())
-
-    @property
-    def where(self) -> str:
-        """For messages."""
-        return f"{self.file}, line {self.row}"
 
     def refusal(self, allowed: str) -> InputError:
         """A refusal of this keyword."""

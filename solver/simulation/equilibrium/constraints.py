@@ -14,7 +14,6 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.motions import motion_fields, smoothed, support_resistance, unheld_motion
 from ...lac.operator import without_round_off
-from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.bodies import nodes_of_unknowns
 from ...mechanics.fem.elasticity import stiffness
 from ...mechanics.linear.choice import against_multigrid
@@ -30,8 +29,6 @@ from ..scene.scene import Scene, ZoneScene
 MIN_COVERAGE = 0.01
 # Multipliers whose coefficients on free unknowns are below this share of all are inactive.
 _ACTIVE = 1e-12
-# Normals that differ by less are those of flat surfaces.
-_BENT = 1e-9
 # Coverage above one by more than this means that the master surface lies there twice.
 _TWICE = 1e-6
 
@@ -170,10 +167,8 @@ def _smooth_gaps(scene: Scene) -> sparse.csr_matrix | None:
         rows.append(operator.matrix)
         if zone.zone.normal != "element" or operator.nodes is not None or scene.space < 3:
             continue
-        faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in zone.slave_faces]
-        near = vertex_neighbours(faces, zone.count)
-        rows[-1] = smoothed(operator.matrix, surface.normal, surface.area, near)
-        bent = bent or abs(rows[-1] - operator.matrix).max() > _BENT * abs(operator.matrix).max()
+        rows[-1] = smoothed(operator.matrix, surface.normal, surface.area, zone.near)
+        bent = bent or rows[-1] is not operator.matrix
     slips = [row for zone in scene.zones for row in zone.operator.slip]
     return sparse.vstack([*rows, *slips]).tocsr() if bent else None
 

@@ -11,6 +11,7 @@ may be others.
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -264,15 +265,12 @@ class Search:
         corrected by what the law is off then. None where the contact is too large, or the law is
         not fulfilled in the end: then the iteration over statuses has its turn.
         """
-        problem, k, base = self.problem, len(self.rows), self.problem.constraints
+        problem, base = self.problem, self.problem.constraints
         rows = base.eligible
         if not 0 < rows.sum() <= _MOST_ROWS:
             return None
         problem.hold_across(None)
-        area, number = base.covered[rows], np.cumsum(rows) - 1
-        there = rows[self.gaps]
-        friction, of = self.coefficient[there], number[self.gaps[there]]
-        contact = CoulombContact(problem.contact_stiffness(), friction, of, k)
+        area, contact = base.covered[rows], self._contact
         start = problem.with_jumps(self.step, np.zeros(len(rows)), self.correction)
         solution = contact.solve(area * start.pressure[rows])
         self.count += 1
@@ -293,15 +291,23 @@ class Search:
                 break
             z, last = following, fault
         closed, slips = np.zeros(len(rows), dtype=bool), np.zeros(len(self.gaps), dtype=bool)
-        closed[rows], slips[there] = (
-            np.concatenate([values, np.zeros(k * len(of), dtype=bool)]) if n == 0 else values
-            for n, values in enumerate(contact.statuses(forces, z))
+        closed[np.flatnonzero(rows)[: contact.m]], slips[rows[self.gaps]] = contact.statuses(
+            forces, z
         )
         state = self._as_equilibrium(found, closed & base.closable, slips)
         if fault < _STANDS and state.accuracy.estimate < _ACCURATE:
             return state
         self.inexact = state if fault < _TOLERATED else None
         return None
+
+    @cached_property
+    def _contact(self) -> CoulombContact:
+        """The contact alone, of the rows that may close or stick."""
+        rows = self.problem.constraints.eligible
+        number, there = np.cumsum(rows) - 1, rows[self.gaps]
+        friction, of = self.coefficient[there], number[self.gaps[there]]
+        stiffness = self.problem.contact_stiffness()
+        return CoulombContact(stiffness, friction, of, len(self.rows))
 
     def _as_equilibrium(
         self, found: Equilibrium, closed: np.ndarray, slips: np.ndarray

@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 
 from ...lac.cells.faces import FaceBlock, area_vectors, surface_normals
 from ...lac.cells.shape import shape_functions
-from ...lac.reconstruction import vertex_neighbours
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
 from ..results.balance import strain_energy
@@ -108,10 +107,7 @@ def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
     if not (np.abs(apart) > _FITS * depth.max() * operator.covered).any():
         return None  # the facets of both sides lie on one another
     number = np.concatenate([block.number for block in zone.slave_faces])
-    faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in zone.slave_faces]
-    around = vertex_neighbours(faces, zone.count).astype(float) @ sparse.diags(
-        operator.surface.area
-    )
+    around = zone.near.astype(float) @ sparse.diags(operator.surface.area)
     by_macro = np.zeros((2, zone.count))
     by_macro[:, number] = rise, depth
     gap = around @ by_macro[0] / np.asarray(around.sum(axis=1)).ravel()

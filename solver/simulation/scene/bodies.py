@@ -10,6 +10,7 @@ of their contact; ḡ stays the initial gap. A body that supports or its rigidit
 it is, has neither strain nor a free unknown: its stiffness is not needed, whatever presses on it.
 """
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -115,14 +116,16 @@ def _refuse_unmerged(scene: Scene) -> None:
 
 def coincident(scene: Scene) -> dict[tuple[int, int], int]:
     """How many nodes pairs of bodies have at the same places, where no zone is between them."""
+    apart = ~np.eye(scene.n_bodies, dtype=bool)
+    for zone in scene.zones:
+        sides = (sorted(_bodies(scene, f)) for f in (zone.slave_faces, zone.master_faces))
+        pair = np.ix_(*sides)
+        apart[pair] = apart.T[pair] = False
+    if not apart.any():
+        return {}
     pairs = cKDTree(scene.points).query_pairs(_ONE_PLACE * scene.length, output_type="ndarray")
-    bodies = np.sort(scene.body[pairs], axis=1).reshape(-1, 2)
-    sides = [(_bodies(scene, z.slave_faces), _bodies(scene, z.master_faces)) for z in scene.zones]
-    found: dict[tuple[int, int], int] = {}
-    for a, b in bodies[bodies[:, 0] != bodies[:, 1]].tolist():
-        if not any((a in s and b in m) or (b in s and a in m) for s, m in sides):
-            found[a, b] = found.get((a, b), 0) + 1
-    return found
+    a, b = np.sort(scene.body[pairs], axis=1).reshape(-1, 2).T
+    return Counter(zip(a[apart[a, b]].tolist(), b[apart[a, b]].tolist(), strict=True))
 
 
 def without_unloaded(scene: Scene) -> Scene:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import meshio
@@ -14,6 +15,7 @@ from ...case.model import Case
 from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces, cut
 from ...lac.operator import GapOperator
+from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.faces import volume_cells
 from ...mechanics.fem.loads import StrainLoads
@@ -61,6 +63,12 @@ class ZoneScene:
     def numbers(self) -> slice:
         """The zone's multipliers among all."""
         return slice(self.first, self.first + len(self.operator.initial))
+
+    @cached_property
+    def near(self) -> sparse.csr_matrix:
+        """Pairs (m, m) of macro-elements that share a vertex."""
+        faces = [(b.number, b.nodes[:, : b.type.n_vertices]) for b in self.slave_faces]
+        return vertex_neighbours(faces, self.count)
 
     def at_nodes(self, values: np.ndarray) -> np.ndarray:
         """Values (k,) of all multipliers at the nodes (n,) that the zone's ones belong to."""
