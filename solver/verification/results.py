@@ -24,10 +24,12 @@ that the checks need, so that it can be judged without solving:
 
 Where the case names its units, fields have them as their attribute `unit`, and the grid lists them.
 Its last line is the hash of all before it: a file that was damaged is refused before HDF5 sees it.
+The attribute `layout` tells names, types and shapes, for a file that another program changed.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
@@ -93,6 +95,7 @@ def write_result(
     with replacing(path) as temporary:
         with new_file(temporary) as file:
             _write(file, solution, checks, provenance)
+            file.attrs["layout"] = _layout(file)
         return seal(temporary)
 
 
@@ -138,6 +141,8 @@ def read_result(path: str | Path) -> Result:
         raise _no_result(path, "damaged, of another version, or another kind of file")
     try:
         with h5py.File(path) as file:
+            if file.attrs.get("layout") != _layout(file):
+                raise _no_result(path, "its fields have other names, types or shapes")
             result = Result(_read_solution(file), _plain(file["provenance"].attrs), sha256)
         fault = inconsistency(result.solution)
     except InputError:
@@ -149,6 +154,20 @@ def read_result(path: str | Path) -> Result:
     if fault:
         raise _no_result(path, fault)
     return result
+
+
+def _layout(file: h5py.File) -> str:
+    """A hash of names, types and shapes of all data sets and of their attributes."""
+    lines: list[str] = []
+
+    def add(name: str, item: h5py.HLObject) -> None:
+        if isinstance(item, h5py.Dataset):
+            lines.append(f"{name} {item.dtype} {item.shape}")
+        attributes = (item.attrs.get_id(key) for key in item.attrs)
+        lines.extend(f"{name} {at.name!r} {at.dtype} {at.shape}" for at in attributes)
+
+    file.visititems(add)
+    return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
 
 
 def _no_result(path: str | Path, fault: str) -> InputError:

@@ -152,6 +152,29 @@ def test_the_slave_surface_of_a_case_in_space(tmp_path):
     assert found.verdict == "passed", found.reason
 
 
+def test_a_component_of_an_array_of_a_vtu_file(tmp_path):
+    """As ccx2paraview writes CPRESS: meshio drops the names of components."""
+    mesh, case = results.mesh_and_case("ssnp170/k")
+    nodes = results.slave_nodes(mesh, case)
+    values = np.tile([0.5, 25.0, 7.0], (len(nodes), 1))
+    number = np.arange(len(nodes))[:, None]
+    surface = meshio.Mesh(mesh.points[nodes], [("vertex", number)], point_data={"CONTACT": values})
+    path = tmp_path / "a.vtu"
+    meshio.vtu.write(path, surface)
+    text, tag = path.read_bytes(), b'Name="CONTACT"'
+    assert text.count(tag) == 1
+    names = ((b"COPEN", b"CPRESS", b"CSHEAR"), (b"A", b"B", b"C"))
+    told = [b" ".join(b'ComponentName%d="%s"' % pair for pair in enumerate(n)) for n in names]
+    path.write_bytes(text.replace(tag, tag + b" " + told[0]))
+    found = check_foreign(case, read_result_files([path]), mesh, ["pressure"])
+    assert found.verdict == "passed", found.reason
+    path.write_bytes(text.replace(tag, tag + b" " + told[1]))
+    names = tmp_path / "map.yaml"
+    names.write_text("fields: {pressure: {name: CONTACT B}}\n")
+    found = check_foreign(case, read_result_files([path], names), mesh, ["pressure"])
+    assert found.verdict == "passed", found.reason
+
+
 def write_exodus(path, points, cells, fields):
     with netcdf_file(path, "w") as file:
         file.createDimension("time_step", None)

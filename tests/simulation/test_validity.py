@@ -1,14 +1,20 @@
 """What a solve takes for granted: slip, overlap and covered parts by hand, and the verdict."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import solver.lac.threads
 import solver.simulation.judgement.validity
 from solver import solve_case
+from solver.case.reader import parse_case
 from solver.lac.cells.catalogue import BY_NAME
+from solver.mesh import generate
 from solver.simulation.judgement import validity
 from solver.simulation.judgement.validity import inside_others
+from solver.simulation.simulate import simulate
+from solver.verification.checks import run_checks
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from tests import scenes
@@ -158,3 +164,75 @@ def test_a_clearance_is_where_bodies_are_and_not_their_mesh():
     assert found.pressure == pytest.approx(25.0, rel=1e-9)
     assert found.verdict == "solved"
     assert found.solution.validity.pushed_past == 0
+
+
+FITTED = """\
+name: fitted
+mesh:
+  recipe: rings
+  radii: [0.5, 1, 1.5]
+  bottom: {cells: QUAD4, divisions: [9, 3]}
+  top: {cells: QUAD4, divisions: [9, 3]}
+plane: stress
+materials: {all: {young: 1000.0, poisson: 0.3}}
+supports:
+  - {group: symx, fix: [x]}
+  - {group: farx, fix: [y]}
+contact: [{name: fit, slave: bottom_contact, master: top_contact}]
+reference: {kind: analytical, contact_pressure: PRESSURE}
+tolerance: 5.0e-2
+"""
+
+
+def nodes_in(mesh, group):
+    """Which nodes (n,) are in the cells of a group."""
+    chosen = np.zeros(len(mesh.points), dtype=bool)
+    for block, cells in zip(mesh.cells, mesh.cell_sets[group], strict=True):
+        chosen[block.data[cells]] = True
+    return chosen
+
+
+@pytest.mark.parametrize(("lost", "verdict"), [(0.0, "passed"), (0.02, "failed")])
+def test_facets_that_overlap_end_beside_each_other_on_a_plane_of_symmetry(lost, verdict):
+    """Normals of the last facet lean by 5° and pass the end of the bore by 0.004 tan 5°.
+
+    A bore that ends early is told from it.
+    """
+    over = 0.004
+    pressure = 1000 * over / ((1.5**2 + 1) / (1.5**2 - 1) + (1 + 0.5**2) / (1 - 0.5**2))
+    case = parse_case(FITTED.replace("PRESSURE", f"{pressure}"), Path("case.yaml"))
+    mesh = generate(case.mesh, "test")
+    inner = nodes_in(mesh, "bottom")
+    mesh.points[inner] *= 1 + over
+    x, y = mesh.points[~inner, :2].T
+    angle, radius = np.arctan2(x, y) * (1 - lost), np.hypot(x, y)
+    mesh.points[~inner, 0] = radius * np.sin(angle)
+    mesh.points[~inner, 1] = radius * np.cos(angle)
+    solution = simulate(case, mesh)
+    checks = run_checks(solution)
+    judged = judge(solution, checks)
+    assert judged.verdict == verdict, judged.reason
+    assert next(c.passed for c in checks if c.name == "coverage") == (not lost)
+    assert min(judged.coverage) < 1 - 1e-4
+
+
+def test_the_flank_of_a_rounding_needs_no_partner():
+    """A rounded slave on a plate: faces that turn away far from contact lie opposite nothing."""
+    text = CASE.replace("high: [1.5, 0]", "high: [20, 0]")
+    for name, value in (SLIDING | {"WIDE": "1", "LOW": "0"}).items():
+        text = text.replace(name, value)
+    text = text.replace("slave: floor, master: under", "slave: under, master: floor")
+    text = text.replace("[4, 2]", "[20, 4]").replace("ALONG", "0")
+    mesh = generate(parse_case(text, Path("case.yaml")).mesh, "test")
+    upper = nodes_in(mesh, "upper")
+    x, t = mesh.points[upper, 0].copy(), 1 - mesh.points[upper, 1]
+    turn = np.maximum(x - 0.5, 0) * np.pi
+    x = np.minimum(x, 0.5) + 0.5 * np.sin(turn)
+    mesh.points[upper, 0] = x
+    mesh.points[upper, 1] = 1 - t * (0.5 + 0.5 * np.cos(turn))
+    bottom = '{within: upper, where: "min(0.51 - y, 2*x - y)"}'
+    text = text.replace("{plane: {point: [0, 0], normal: [0, 1]}, within: upper}", bottom)
+    found = scenes.solved(text, mesh)
+    assert len(found.zones[0].area) == 20
+    assert found.zones[0].coverage.min() == 0
+    assert found.validity.unpaired == 0

@@ -262,6 +262,19 @@ def lose_step(file):
         data[0] = 2.5
 
 
+def other_type(file):
+    values = file["contact/interface/status"]
+    text = np.full(values.shape, b"text")
+    del file["contact/interface/status"]
+    file["contact/interface/status"] = text
+
+
+def other_shape(file):
+    values = file["VTKHDF/PointData/body"][()]
+    del file["VTKHDF/PointData/body"]
+    file["VTKHDF/PointData/body"] = values[:, None]
+
+
 def not_a_number(file):
     file["contact/interface/gap"][0] = np.nan
 
@@ -269,8 +282,10 @@ def not_a_number(file):
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        (lose_group, "balance"),
-        (lose_zone, "the contact zones differ from the case's"),
+        (lose_group, "other names, types or shapes"),
+        (lose_zone, "other names, types or shapes"),
+        (other_type, "other names, types or shapes"),
+        (other_shape, "other names, types or shapes"),
         (lose_step, "the load steps differ from the case's"),
         (not_a_number, "zones[interface].gap holds values that are not finite numbers"),
     ],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +20,26 @@ from .raw import Raw, RawField, at_cells, at_nodes, plain_mesh
 
 
 def read_vtu(path: Path) -> Raw:
-    """Point and cell data of a VTU file, read by meshio."""
-    return of_mesh(meshio.vtu.read(path))
+    """Point and cell data of a VTU file, read by meshio, which drops the names of components."""
+    found, names = of_mesh(meshio.vtu.read(path)), _component_names(path)
+    fields = {
+        name: field._replace(components=names[name])
+        if len(names.get(name, ())) == field.values.shape[1]
+        else field
+        for name, field in found.fields.items()
+    }
+    return replace(found, fields=fields)
+
+
+def _component_names(path: Path) -> dict[str, tuple[str, ...]]:
+    """The names of the components of arrays in a VTU file: `ComponentName0="…"` and so on."""
+    found = {}
+    for tag in re.findall(rb"<DataArray\b[^>]*>", path.read_bytes()):
+        text = {k.decode(): v.decode() for k, v in re.findall(rb'(\w+)="([^"]*)"', tag)}
+        keys = takewhile(text.__contains__, (f"ComponentName{i}" for i in count()))
+        if names := tuple(text[key] for key in keys):
+            found[text.get("Name", "")] = names
+    return found
 
 
 def of_mesh(found: meshio.Mesh) -> Raw:

@@ -240,10 +240,15 @@ def _partly_covered(zone: ZoneScene, closed: np.ndarray) -> int:
 
 
 def _unpaired(zone: ZoneScene, closed: np.ndarray) -> float:
-    """The largest share of a macro-element that lost its partner, closed or not covered at all."""
+    """The largest share of a macro-element that lost its partner, closed or not covered at all.
+
+    One that is not covered counts beside closed ones. Elsewhere it turns away from a master that
+    it does not touch, as the flank of a rounding does.
+    """
     surface = zone.operator.surface
     pressed = zone.by_macro_element(closed.astype(float)) > 0
     bare = surface.covered <= MIN_COVERAGE * surface.area
+    bare &= zone.near @ pressed > 0
     return float(np.max((surface.lost / surface.area)[pressed | bare], initial=0.0))
 
 

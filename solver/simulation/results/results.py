@@ -160,11 +160,20 @@ def _zone_result(
         master_nodes=master_nodes,
         nodal=_nodal_contact(zone, state),
         pressure_of_forces=pressure_of_forces,
+        meshed_gap=_meshed_gap(scene, zone),
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
         resultants=step.resultants[zone.zone.name],
         friction=zone_friction(zone, state, field),
     )
+
+
+def _meshed_gap(scene: Scene, zone: ZoneScene) -> np.ndarray:
+    """The mean distance (m,) of the surfaces where they meet, along the normal; 0 where nowhere."""
+    operator = zone.operator
+    apart, none = operator.matrix @ scene.points.ravel(), np.zeros(len(operator.covered))
+    apart = np.divide(apart, operator.covered, out=none, where=operator.covered > 0)
+    return np.asarray(operator.mean @ apart)
 
 
 def _recovered_pressure(

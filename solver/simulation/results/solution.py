@@ -115,7 +115,8 @@ class ZoneResult:
     `faces`: the slave sub-faces by cell type: (type, connectivity (s, nodes) into the mesh's
     points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
     (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
-    (intersected over whole area) are (m,). `stress_slave` and `stress_master` hold n·σ·n at
+    (intersected over whole area) are (m,); `meshed_gap` (m,), the mean distance of the surfaces as
+    they are meshed, is None in results of other codes. `stress_slave` and `stress_master` hold n·σ·n at
     `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
     belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
     `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
@@ -142,6 +143,7 @@ class ZoneResult:
     master_nodes: np.ndarray
     nodal: NodalContact | None = None
     pressure_of_forces: np.ndarray | None = None
+    meshed_gap: np.ndarray | None = None
     pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
     resultants: Resultants | None = None
