@@ -127,6 +127,9 @@ test: test-environment ## run the tests
 faults: test-environment ## read 1,000 (or COUNT=…) damaged files: none may pass unnoticed
 	@$(TESTS) tests.faults $(or $(COUNT),1000)
 
+pairs: test-environment ## solve every pair of options of a case, compared with formulas; STRENGTH=3
+	@$(TESTS) tests.pairs
+
 mutants: test-environment ## plant faults in the core, one at a time, and see which check catches each
 	@$(TESTS) tests.faults.mutants
 

@@ -212,6 +212,7 @@ _PAGES = {
     "scaling": "scaling",
     "infsup": "inf-sup test",
     "benchmark": "time ratios",
+    "pairs": "every pair of options",
     "bench": "other codes on the same cases",
     "compare": "comparison with another batch",
 }

@@ -15,7 +15,8 @@ from ..case.expressions import EXACT, Expression, evaluate
 from ..lac.cells.faces import surface_points
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
-from ..verification.samples import expected_coverage, reference_where_covered
+from ..verification.coverage import expected_coverage
+from ..verification.samples import reference_where_covered
 from ..verification.units import with_unit
 from .charts import (
     BLUE,

@@ -14,7 +14,6 @@ from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, with_points
 
-PLANE = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]
 CASE = """\
 name: patch
 mesh: {recipe: blocks, size: 1.0}
@@ -63,45 +62,6 @@ def errors(solution, held, poisson=POISSON):
         "coverage": np.abs(zone.coverage - 1).max(),
         "balance": max(solution.balance.values()),
     }
-
-
-@pytest.mark.parametrize("top", PLANE)
-@pytest.mark.parametrize("bottom", PLANE)
-def test_patch(bottom, top):
-    """Both slaves, a disc and a ring, free and held across the axis, cells straight and bent."""
-    i = PLANE.index(bottom) + PLANE.index(top)
-    for swapped in (False, True):
-        radius, held, bent = (0.0, 0.4)[(i + swapped) % 2], bool(i % 2), i % 3 == 0
-        found = simulate(case(held=held).as_solved(swapped), mesh(bottom, top, radius, bent))
-        assert max(errors(found, held).values()) < 1e-12
-
-
-@pytest.mark.parametrize("radius", [0.0, 0.4, 1000.0])
-@pytest.mark.parametrize(
-    "zone",
-    [
-        ", treatment: uncut",
-        ", treatment: nodal",
-        ", normal: nodal",
-        ", recovery: linear",
-        ", recovery: quadratic",
-    ],
-)
-def test_patch_of_treatments_that_are_exact(zone, radius):
-    found = simulate(case(zone), mesh("QUAD9", "TRIA6", radius))
-    assert max(errors(found, False).values()) < (1e-11 if radius > 1 else 1e-12)
-
-
-def test_patch_with_dual_multipliers():
-    found = simulate(case(", treatment: nodal_dual"), mesh("QUAD4", "TRIA3", 0.0))
-    assert max(errors(found, False).values()) < 1e-12
-
-
-@pytest.mark.parametrize("cells", PLANE)
-def test_patch_in_mixed_form(cells):
-    nearly = case(held=cells == "TRIA6", **{"poisson: 0.3": "poisson: 0.4999, form: mixed"})
-    found = errors(simulate(nearly, mesh(cells, "QUAD8", 0.0)), cells == "TRIA6", 0.4999)
-    assert max(found.values()) < 1e-12
 
 
 def test_forces_are_those_of_the_whole_circle():

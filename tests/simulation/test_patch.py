@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from solver.lac import operator
-from solver.lac.cells.catalogue import BY_NAME
 from solver.mesh import generate
 from solver.simulation.simulate import simulate
 from tests.scenes import block_case, block_mesh, errors, moved, straightened, with_points
@@ -43,22 +42,6 @@ def assert_exact(solution, size=1.0, **scaled):
     found = errors(solution, size, **scaled)
     assert {k: v for k, v in found.items() if not v < ROUND_OFF[k]} == {}
     assert all(zone.closed.all() for zone in solution.zones)
-
-
-@pytest.mark.parametrize("swapped", [False, True])
-@pytest.mark.parametrize("top", PLANE)
-@pytest.mark.parametrize("bottom", PLANE)
-def test_plane_pairs(bottom, top, swapped):
-    mesh = block_mesh(bottom, top, (4, 3))
-    assert_exact(simulate(block_case(2).as_solved(swapped), mesh))
-
-
-@pytest.mark.parametrize("top", SOLID)
-@pytest.mark.parametrize(("bottom", "hexahedra"), CUTS)
-def test_solid_pairs(bottom, top, hexahedra):
-    """Each pair stands twice in the table, once with either block below: the slave."""
-    mesh = block_mesh(bottom, top)
-    assert_exact(simulate(block_case(3).as_solved(hexahedra=hexahedra), mesh))
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -125,15 +108,6 @@ def test_coincident_and_nearly_coincident_meshes(shift):
     assert_exact(simulate(block_case(3), with_points(mesh, points)))
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e6])
-@pytest.mark.parametrize("types", [("TRIA3", "QUAD8"), ("HEXA8", "TETRA10")])
-def test_the_unit_of_length_does_not_matter(types, scale):
-    mesh = block_mesh(*types, size=1.0)
-    dim = BY_NAME[types[0]].dim
-    case = block_case(dim)
-    assert_exact(simulate(case, with_points(mesh, mesh.points * scale)), size=scale)
-
-
 def test_renumbering_changes_nothing_but_the_order():
     mesh = block_mesh("TETRA10", "HEXA20")
     rng = np.random.default_rng(2)
@@ -147,16 +121,6 @@ def test_renumbering_changes_nothing_but_the_order():
     assert_exact(after)
     n = len(mesh.points)
     assert after.displacement[new] == pytest.approx(before.displacement[:n], abs=1e-15)
-
-
-def test_two_steps_are_proportional():
-    case = block_case(3, "steps: [0.5, 1.0]\nobserve: [{zone: interface, nearest: [1, 1, 0]}]\n")
-    solution = simulate(case, block_mesh("TETRA4", "TETRA4"))
-    half, full = (step.observations[0] for step in solution.steps)
-    assert half["macro_element"] == full["macro_element"]
-    assert half["pressure"] == pytest.approx(12.5, rel=1e-12)
-    assert full["pressure"] == pytest.approx(25.0, rel=1e-12)
-    assert_exact(solution)
 
 
 def test_a_multiplier_without_the_cut_would_still_pass_but_the_master_must_be_whole():

@@ -113,8 +113,8 @@ _GAIN = 0.5
 class AugmentedSystem(ConstrainedSystem):
     """`scaled` Ĝ (m, n): constraints, each divided by its `size` (m,); the `factor` of A.
 
-    `compliance` (n,): the inverse of the diagonal D of K; the factor `gram` of Ĝ D⁻¹ Ĝᵀ;
-    the `weight` w.
+    `compliance` (n,): the inverse of the diagonal D of K, zero for rigid unknowns, which have no
+    stiffness; the factor `gram` of Ĝ D⁻¹ Ĝᵀ; the `weight` w.
     """
 
     scaled: sparse.csr_matrix
@@ -180,7 +180,7 @@ def augment(
     `unknowns`, `gave_up`, `shared`: see `prepare`. Raises SolveError where constraints nearly
     depend on one another, or a factor finds that they leave a motion free.
     """
-    compliance = 1 / matrix.diagonal()
+    compliance = _compliance(matrix)
     square = constraints.multiply(constraints) @ compliance
     size = np.sqrt(np.asarray(square).ravel())
     try:
@@ -206,6 +206,12 @@ def augment(
         gram=gram,
         weight=weight,
     )
+
+
+def _compliance(matrix: Stiffness) -> np.ndarray:
+    """The inverse of the diagonal (n,); zero for rigid unknowns, which have no stiffness."""
+    diagonal = matrix.diagonal()
+    return np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0)
 
 
 def _augmented(matrix: Stiffness, scaled: sparse.csr_matrix, weight: float) -> Symmetric:

@@ -43,15 +43,15 @@ class _Law:
 class CoulombContact:
     """The contact of m gaps and of f macro-elements with friction, which slip along k tangents.
 
-    `stiffness` S (r, r): rows of the gaps, then of the slips along the first tangent, and so on;
-    `friction` μ (f,); `of` (f,): the gap each one has.
+    `stiffness` S (r, r): rows of the gaps come first; `friction` μ (f,); `of` (f,): the gap each
+    one has; `rows` (k, f): those of its slips, by tangent, in any order.
     """
 
-    def __init__(self, stiffness: np.ndarray, friction: np.ndarray, of: np.ndarray, k: int):
-        f = len(friction)
+    def __init__(
+        self, stiffness: np.ndarray, friction: np.ndarray, of: np.ndarray, rows: np.ndarray
+    ):
         self.stiffness, self.friction, self.of = (stiffness + stiffness.T) / 2, friction, of
-        self.m = m = len(stiffness) - k * f
-        self.rows = [m + i * f + np.arange(f) for i in range(k)]
+        self.m, self.rows = len(stiffness) - rows.size, list(rows)
         self.c = np.abs(np.diag(stiffness))
         # One for all tangents of a macro-element, or its traction would not be along its slip.
         for rows in self.rows:
@@ -68,7 +68,7 @@ class CoulombContact:
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
 
-        >>> contact = CoulombContact(np.eye(2), np.array([0.5]), np.array([0]), 1)
+        >>> contact = CoulombContact(np.eye(2), np.array([0.5]), np.array([0]), np.array([[1]]))
         >>> found, jump, _ = contact.solve(np.array([2.0, 1.5]))
         >>> found.round(12).tolist(), (-jump[1:]).round(12).tolist()
         ([2.0, 1.0], [0.5])

@@ -307,7 +307,7 @@ class Search:
         number, there = np.cumsum(rows) - 1, rows[self.gaps]
         friction, of = self.coefficient[there], number[self.gaps[there]]
         stiffness = self.problem.contact_stiffness()
-        return CoulombContact(stiffness, friction, of, len(self.rows))
+        return CoulombContact(stiffness, friction, of, number[self.rows[:, there]])
 
     def _as_equilibrium(
         self, found: Equilibrium, closed: np.ndarray, slips: np.ndarray

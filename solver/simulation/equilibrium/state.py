@@ -230,7 +230,9 @@ def estimate(
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
-    mean_stress = scene.mean.cancellation(iterate.mean_stress)[1]
+    # Of a stress, that of initial strain is taken off in double precision.
+    taken_off = float(np.abs(scene.initial.stress).max(initial=0.0))
+    mean_stress = max(scene.mean.cancellation(iterate.mean_stress)[1], taken_off)
     errors = {
         "forces": pressure_of_forces(moving, noise),
         "gap": pressure_of_gaps(moving, rounded.gaps[closed], diagonal),

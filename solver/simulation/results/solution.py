@@ -116,15 +116,14 @@ class ZoneResult:
     points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
     (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
     (intersected over whole area) are (m,); `meshed_gap` (m,), the mean distance of the surfaces as
-    they are meshed, is None in results of other codes. `stress_slave` and `stress_master` hold n·σ·n at
-    `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where multipliers
-    belong to nodes, `nodal` has them, and the values by macro-element are averages of theirs.
-    `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes; None where
-    these do not determine it (see `results.balance`). `pressure_error` (m,) estimates the
-    L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*; None
-    where multipliers belong to nodes. `recovered` is p* where the case asks for one. `resultants`:
-    area, force, moment and edges of contact. `friction`: see
-    there; None without.
+    they are meshed, is None in results of other codes. `stress_slave` and `stress_master` hold
+    n·σ·n at `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where
+    multipliers belong to nodes, `nodal` has them, and the values by macro-element are averages of
+    theirs. `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes;
+    None where these do not determine it (see `results.balance`). `pressure_error` (m,) estimates
+    the L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*;
+    None where multipliers belong to nodes. `recovered` is p* where the case asks for one.
+    `resultants`: area, force, moment and edges of contact. `friction`: see there; None without.
     """
 
     name: str

@@ -22,6 +22,7 @@ from ...case.model import Case
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces
+from ...lac.facets import facets
 from ...lac.motions import body_numbers
 from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
 from ...mechanics.fem.loads import Field, at_nodes, foundation
@@ -311,3 +312,19 @@ def unit_springs(springs: sparse.csr_matrix) -> sparse.csr_matrix:
         return springs[:0]
     largest = abs(springs).max(axis=1).toarray().ravel()
     return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ springs).tocsr()
+
+
+def refuse_bent(case: Case, points: np.ndarray, surfaces: Surfaces) -> None:
+    """Raise InputError where hexahedra cut from a HEXA20 would leave its bent face.
+
+    They lie askew in it: quadratic faces with the nodes of the cut are no parts of the whole face.
+    """
+    for number, (zone, (slave, _)) in enumerate(zip(case.zones, surfaces, strict=True)):
+        if zone.hexahedra != "hexahedra" or not TREATMENTS[zone.treatment].cut:
+            continue
+        for block in slave:
+            made = facets(points, block.type, block.nodes, block.number, case.axisymmetric)
+            if block.owner_type.name == "HEXA20" and not made.flat.all():
+                key = f"contact[{number}].hexahedra"
+                allowed = "HEXA20 keep bent slave faces under pyramids alone; allowed: pyramids"
+                raise InputError(case.path, key, zone.hexahedra, allowed)

@@ -25,7 +25,7 @@ from ...mechanics.mortar.treatments import TREATMENTS, Treatment, merge_fixed_mu
 from ...system.progress import Clock, stage
 from ..options import LEAN, Options
 from .attributes import Attributes, strain_factors, strain_loads_of
-from .cut_groups import CutZone, Surfaces, springs_of, surfaces_of
+from .cut_groups import CutZone, Surfaces, refuse_bent, springs_of, surfaces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of, with_contact_frames
 from .rigid import Frame
@@ -212,6 +212,7 @@ def build_scene(
     rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     with stage(clock, "cut"):
         surfaces = surfaces_of(case, local)
+        refuse_bent(case, local.points, surfaces)
         cut_mesh, sub_faces = _cut(local, case.zones, surfaces)
     cut_zones = [
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)

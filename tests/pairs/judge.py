@@ -1,0 +1,109 @@
+"""How far a solve is from the exact state, and what came of a row."""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.lac.errors import SolveError
+from solver.simulation.options import LEAN, Options
+from solver.simulation.results.solution import Solution
+from solver.simulation.simulate import assembled, solve_problem
+from solver.system.errors import InputError
+from solver.system.progress import Clock
+
+from .options import Row
+from .problem import Problem, problem_of
+
+# Exact is this; or this, where so many times the solve's own estimate of rounding explains it.
+EXACT, ROUNDING, _MARGIN = 1e-11, 1e-9, 10.0
+COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a row: its largest error and where, or the line that ended it.
+
+    `word`: exact, refused or wrong. `allowed`: the error that counts as exact.
+    """
+
+    word: str
+    error: float
+    what: str
+    seconds: float = 0.0
+
+
+def tried(row: Row) -> Outcome:
+    """Solve a row and compare it with its state."""
+    clock = Clock()
+    try:
+        problem = problem_of(row)
+        options = Options.everything() if row["work"] == "everything" else LEAN
+        made = assembled(problem.case, problem.mesh, options, clock)
+    except InputError as error:
+        return Outcome("refused", np.inf, str(error))
+    except Exception as error:  # noqa: BLE001
+        return Outcome("wrong", np.inf, f"before the solve: {type(error).__name__}: {error}")
+    try:
+        solution = solve_problem(made, clock)
+    except SolveError as error:
+        return Outcome("wrong", np.inf, f"not solved: {error}")
+    except Exception as error:  # noqa: BLE001
+        return Outcome("wrong", np.inf, f"{type(error).__name__}: {error}")
+    errors = errors_of(problem, solution)
+    what, error = max(errors.items(), key=lambda pair: pair[1])
+    estimate = max(solution.accuracy.values(), default=0.0)
+    if row["materials"] == "stiff master":  # rounded displacements of its supports are stresses
+        estimate = ROUNDING
+    allowed = min(ROUNDING, max(EXACT, _MARGIN * estimate))
+    return Outcome("exact" if error <= allowed else "wrong", error, what)
+
+
+def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
+    """The largest error of each field, over the scale of the field."""
+    placed, dim = problem.placed, len(problem.placed.origin)
+    scale = max(float(np.abs(body.stress).max()) for body in problem.bodies)
+    names = {i: body.name for i, body in enumerate(solution.bodies)}
+    found: dict[str, float] = {}
+    moved, wanted = solution.displacement, np.zeros_like(solution.displacement)
+    seen = np.zeros(len(moved), dtype=bool)
+    for number, name in names.items():
+        body = next((b for b in problem.bodies if b.name == name), None)
+        if body is None:
+            continue
+        mine = solution.body == number
+        places = (solution.mesh.points[mine, :dim] - placed.origin) @ placed.turn / placed.scale
+        local = places @ body.gradient.T + body.shift
+        wanted[mine] = placed.scale * local @ placed.turn.T
+        seen |= mine
+        if not body.rigid:
+            turn = np.eye(3)
+            turn[:dim, :dim] = placed.turn
+            stress = np.zeros((3, 3))
+            stress[: len(body.stress), : len(body.stress)] = body.stress
+            stress = turn @ stress @ turn.T
+            checked = [k for k, (i, j) in enumerate(COMPONENTS) if max(i, j) < len(body.stress)]
+            exact = np.array([stress[COMPONENTS[k]] for k in checked])
+            error = np.abs(solution.stress[mine][:, checked] - exact).max() / scale
+            found[f"stress of {name}"] = float(error)
+    assert seen.any(), f"no body of the case among {names}"
+    strained = max(float(np.abs(b.stress).max()) / b.young for b in problem.bodies)
+    size = max(float(np.abs(wanted).max()), placed.scale * strained)
+    found["displacement"] = float(np.abs(moved - wanted)[seen].max() / size)
+    for zone in solution.zones:
+        body = problem.bodies[0 if zone.name == "one" else -1]
+        turn = np.zeros((dim, dim))
+        turn = placed.turn @ body.stress[:dim, :dim] @ placed.turn.T
+        normal = zone.normal[:, :dim]
+        traction = normal @ turn
+        pressed = np.einsum("md,md->m", traction, normal)
+        found[f"pressure of {zone.name}"] = float(np.abs(zone.multiplier + pressed).max() / scale)
+        found[f"gap of {zone.name}"] = float(np.abs(zone.gap).max() / (placed.scale))
+        if zone.friction is not None:
+            along = traction - pressed[:, None] * normal
+            error = np.abs(zone.friction.friction_traction[:, :dim] - along).max() / scale
+            found[f"friction of {zone.name}"] = float(error)
+    return found
+
+
+logging.getLogger("solver").setLevel(logging.ERROR)

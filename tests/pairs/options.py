@@ -1,0 +1,293 @@
+"""The options of a case and their values, and what excludes what.
+
+Values are given by an option's name. The first value of each is the plain one. `EXCLUDED` has the
+pairs (and some triples) that have no exact uniform state or no meaning; `REFUSED` those that the
+program refuses, with the keys that its message must name.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+Row = Mapping[str, str]
+
+PLANE = ("TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9")
+SOLID = (
+    *("HEXA8", "HEXA20", "HEXA27", "TETRA4", "TETRA10"),
+    *("PENTA6", "PENTA15", "PYRA5", "PYRA13"),
+)
+LINEAR = ("TRIA3", "QUAD4", "HEXA8", "TETRA4", "PENTA6", "PYRA5")
+QUADRATIC = tuple(cells for cells in (*PLANE, *SOLID) if cells not in LINEAR)
+HEXA = ("HEXA8", "HEXA20", "HEXA27")
+OPTIONS: dict[str, tuple[str, ...]] = {
+    "space": ("strain", "stress", "axisymmetric", "solid"),
+    "slave cells": (*PLANE, *SOLID),
+    "master cells": (*PLANE, *SOLID),
+    "interface": ("flat", "tilted", "kinked", "curved"),
+    "treatment": ("lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"),
+    "normal": ("element", "nodal", "master"),
+    "hexahedra": ("pyramids", "hexahedra"),
+    "friction": ("none", "held", "stick", "slip", "slip back"),
+    "recovery": ("none", "linear", "quadratic", "smooth", "automatic"),
+    "stabilised": ("no", "yes"),
+    "gap": ("none", "meshed", "interference", "clearance", "clearance 0"),
+    "master": ("meshed", "rigid", "rigid, by force", "plane"),
+    "master size": ("coarser", "as fine", "finer"),
+    "supports": ("imposed", "normal", "springs", "together", "cyclic"),
+    "load": ("pressure", "traction", "force"),
+    "also": ("nothing", "body force", "strain", "temperature"),
+    "steps": ("one", "factors", "path"),
+    "materials": ("equal", "stiff master", "nearly incompressible"),
+    "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
+    "form": ("as it is", "exchanged", "renumbered", "rotated", "far", "other units"),
+    "work": ("lean", "everything"),
+}
+PLAIN = {name: values[0] for name, values in OPTIONS.items()}
+FRICTION = ("held", "stick", "slip", "slip back")
+SHEARED = ("stick", "slip", "slip back")
+SHAPED = ("kinked", "curved")
+RIGID = ("rigid", "rigid, by force", "plane")
+
+
+class Rule(NamedTuple):
+    """Values of options that do not go together, and why; `keys` that a refusal names."""
+
+    when: Mapping[str, tuple[str, ...]]
+    why: str
+    keys: tuple[str, ...] = ()
+
+    def applies(self, row: Row) -> bool:
+        """Whether a row, which may be a part of one, has all of these values."""
+        return all(row.get(name) in values for name, values in self.when.items())
+
+
+def _not(name: str, *values: str) -> tuple[str, ...]:
+    return tuple(value for value in OPTIONS[name] if value not in values)
+
+
+NODAL = ("nodal", "nodal_dual")
+POINTS = ("quadrature", "node_to_segment")
+REFUSED = (
+    Rule(
+        {"friction": FRICTION, "treatment": _not("treatment", "lac")},
+        "friction",
+        ("treatment", "friction"),
+    ),
+    Rule(
+        {"friction": FRICTION, "normal": _not("normal", "element")},
+        "friction",
+        ("normal", "friction"),
+    ),
+    Rule({"friction": FRICTION, "stabilised": ("yes",)}, "friction", ("stabilised", "friction")),
+    Rule(
+        {"treatment": POINTS, "normal": _not("normal", "element")},
+        "normals of its own",
+        ("normal", "treatment"),
+    ),
+    Rule(
+        {"treatment": ("uncut", "node_to_segment", *NODAL), "stabilised": ("yes",)},
+        "no such pressure",
+        ("stabilised", "treatment"),
+    ),
+    Rule(
+        {"supports": ("cyclic",), "treatment": ("node_to_segment", *NODAL)},
+        "two multipliers of one node",
+        ("treatment", "cyclic"),
+    ),
+    Rule(
+        {"treatment": ("nodal_dual",), "slave cells": QUADRATIC},
+        "built of linear functions",
+        ("treatment", "slave"),
+    ),
+    Rule(
+        {
+            "treatment": ("node_to_segment",),
+            "slave cells": ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
+        },
+        "forces",
+        ("treatment", "slave"),
+    ),
+    Rule(
+        {
+            "hexahedra": ("hexahedra",),
+            "interface": ("curved",),
+            "slave cells": ("HEXA20",),
+            "treatment": ("lac", "quadrature"),
+        },
+        "cells cut askew leave bent faces",
+        ("hexahedra", "HEXA20"),
+    ),
+    Rule(
+        {
+            "hexahedra": ("hexahedra",),
+            "interface": ("curved",),
+            "master cells": ("HEXA20",),
+            "treatment": ("lac", "quadrature"),
+            "form": ("exchanged",),
+        },
+        "cells cut askew leave bent faces",
+        ("hexahedra", "HEXA20"),
+    ),
+    Rule(
+        {"treatment": ("nodal_dual",), "master cells": QUADRATIC, "form": ("exchanged",)},
+        "built of linear functions",
+        ("treatment", "slave"),
+    ),
+    Rule(
+        {
+            "treatment": ("node_to_segment",),
+            "master cells": ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
+            "form": ("exchanged",),
+        },
+        "forces",
+        ("treatment", "slave"),
+    ),
+    Rule(
+        {"master": ("plane",), "form": ("exchanged",)},
+        "a rigid side is the master",
+        ("master", "directions"),
+    ),
+    Rule(
+        {"master": ("rigid", "rigid, by force"), "form": ("exchanged",)},
+        "a rigid side is the master",
+        ("master", "directions"),
+    ),
+)
+EXCLUDED = (
+    Rule({"space": _not("space", "solid"), "slave cells": SOLID}, "cells of another dimension"),
+    Rule({"space": _not("space", "solid"), "master cells": SOLID}, "cells of another dimension"),
+    Rule({"space": ("solid",), "slave cells": PLANE}, "cells of another dimension"),
+    Rule({"space": ("solid",), "master cells": PLANE}, "cells of another dimension"),
+    Rule({"slave cells": PLANE, "master cells": SOLID}, "cells of another dimension"),
+    Rule({"slave cells": SOLID, "master cells": PLANE}, "cells of another dimension"),
+    Rule(
+        {"treatment": ("uncut",), "slave cells": ("TETRA4", "PENTA6", "PYRA5")},
+        "faces outnumber nodes: why LAC cuts",
+    ),
+    Rule(
+        {
+            "treatment": ("uncut",),
+            "master cells": ("TETRA4", "PENTA6", "PYRA5"),
+            "form": ("exchanged",),
+        },
+        "faces outnumber nodes: why LAC cuts",
+    ),
+    Rule({"friction": SHEARED, "interface": SHAPED}, "a hydrostatic state has no shear"),
+    Rule({"friction": SHEARED, "space": ("axisymmetric",)}, "no uniform shear about an axis"),
+    Rule({"interface": ("tilted",), "space": ("axisymmetric",)}, "no uniform shear about an axis"),
+    Rule(
+        {"friction": ("slip", "slip back"), "supports": _not("supports", "imposed")},
+        "slides by supports",
+    ),
+    Rule(
+        {"friction": ("slip back",), "interface": _not("interface", "flat")}, "slides along an axis"
+    ),
+    Rule({"friction": ("slip back",), "form": ("rotated",)}, "slides along an axis"),
+    Rule({"friction": ("slip back",), "steps": _not("steps", "one")}, "a path of its own"),
+    Rule(
+        {"friction": ("slip back",), "gap": _not("gap", "none", "clearance 0")},
+        "a gap has no factor",
+    ),
+    Rule({"friction": ("slip back",), "master": RIGID}, "a body has one factor"),
+    Rule({"friction": ("slip back",), "also": ("strain", "temperature")}, "loads have one factor"),
+    Rule(
+        {"friction": ("slip", "slip back"), "second zone": _not("second zone", "none", "friction")},
+        "which zone slips is open",
+    ),
+    Rule({"friction": ("slip",), "steps": ("path",)}, "slip turns back where loads do"),
+    Rule(
+        {
+            "friction": FRICTION,
+            "gap": ("meshed", "interference", "clearance"),
+            "steps": _not("steps", "one"),
+        },
+        "a gap has no factor",
+    ),
+    Rule(
+        {
+            "friction": SHEARED,
+            "master": ("meshed",),
+            "second zone": ("plain", "recovery", "stabilised", "nodal"),
+        },
+        "the shear passes a zone without friction",
+    ),
+    Rule(
+        {"friction": ("none",), "second zone": ("same",), "master": ("plane",)}, "no second surface"
+    ),
+    Rule({"master": ("plane",), "second zone": _not("second zone", "none")}, "no second surface"),
+    Rule({"master": ("plane",), "interface": SHAPED}, "a plane is no such surface"),
+    Rule(
+        {"interface": ("tilted",), "second zone": _not("second zone", "none")},
+        "interfaces are not parallel",
+    ),
+    Rule(
+        {"interface": SHAPED, "gap": ("meshed", "interference", "clearance")},
+        "closes without a uniform state",
+    ),
+    Rule({"interface": ("tilted",), "gap": ("meshed",)}, "the ends of the surfaces part"),
+    Rule(
+        {"interface": _not("interface", "flat"), "supports": ("together", "cyclic")},
+        "displacements differ",
+    ),
+    Rule({"supports": ("together",), "form": ("rotated",)}, "components along axes"),
+    Rule({"space": ("axisymmetric",), "supports": ("cyclic",)}, "no sides"),
+    Rule({"space": ("axisymmetric",), "form": ("rotated",)}, "the axis stays"),
+    Rule(
+        {"master": RIGID, "supports": ("springs", "together"), "second zone": ("none",)},
+        "no elastic body is loaded",
+    ),
+    Rule(
+        {"master": RIGID, "load": ("traction", "force"), "second zone": ("none",)},
+        "no elastic body is loaded",
+    ),
+    Rule({"load": ("traction", "force"), "supports": ("imposed",)}, "displacements are imposed"),
+    Rule(
+        {"interface": SHAPED, "normal": ("nodal", "master")}, "the faces' own normals alone keep it"
+    ),
+    Rule(
+        {"interface": SHAPED, "treatment": ("node_to_segment",)}, "points keep flat surfaces alone"
+    ),
+    Rule({"treatment": POINTS, "second zone": ("same",)}, "meshes of two sides differ"),
+    Rule(
+        {"supports": ("cyclic",), "second zone": _not("second zone", "none")},
+        "nothing holds the body between",
+    ),
+    Rule({"interface": SHAPED, "also": ("temperature",)}, "fits by a strain"),
+    Rule(
+        {"interface": SHAPED, "slave cells": LINEAR, "master cells": QUADRATIC}, "surfaces differ"
+    ),
+    Rule(
+        {"interface": SHAPED, "slave cells": QUADRATIC, "master cells": LINEAR}, "surfaces differ"
+    ),
+    *(
+        Rule({"space": ("solid",), "interface": shapes, side: cells}, "edges differ")
+        for side in ("slave cells", "master cells")
+        for shapes, cells in (
+            (("kinked",), _not(side, *HEXA)),
+            (("curved",), tuple(c for c in LINEAR if c != "HEXA8")),
+        )
+    ),
+    *(
+        Rule(
+            {"space": ("solid",), name: values, side: _not(side, *HEXA)},
+            "meshes of two sides differ",
+        )
+        for side in ("slave cells", "master cells")
+        for name, values in (("supports", ("cyclic",)), ("treatment", POINTS))
+    ),
+    Rule(
+        {"treatment": POINTS, "slave cells": LINEAR, "master cells": QUADRATIC},
+        "meshes of two sides differ",
+    ),
+    Rule(
+        {"treatment": POINTS, "slave cells": QUADRATIC, "master cells": LINEAR},
+        "meshes of two sides differ",
+    ),
+    Rule(
+        {"interface": SHAPED, "master": RIGID, "also": _not("also", "strain")}, "a state of its own"
+    ),
+)
+
+
+def possible(row: Row) -> bool:
+    """Whether the values of a row, or of a part of one, go together."""
+    return not any(rule.applies(row) for rule in (*REFUSED, *EXCLUDED))

@@ -1,0 +1,82 @@
+"""What goes with what: a page with the digits of a run, and a table of the documentation."""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
+from math import log10
+from pathlib import Path
+
+from solver.report.formats import PAGE, render
+from solver.system.files import write_text
+
+from .judge import Outcome
+from .options import EXCLUDED, OPTIONS, REFUSED, Row, Rule
+
+_TEMPLATE = Path(__file__).with_name("page.html.jinja")
+_EMPTY = "–"
+
+
+def page(target: Path, outcomes: Sequence[tuple[Row, Outcome]], said: str, good: bool) -> None:
+    """Write the page of a run."""
+    digits: dict[frozenset[str], float] = {}
+    for row, outcome in outcomes:
+        error = outcome.error if outcome.word == "exact" else 1.0
+        found = min(16.0, -log10(max(error, 1e-16)))
+        for pair in map(frozenset, combinations(row, 2)):
+            digits[pair] = min(digits.get(pair, 16.0), found)
+    names = list(OPTIONS)
+    table = [
+        [_cell(digits.get(frozenset((one, other))), one, other) for other in names[:i]]
+        for i, one in enumerate(names)
+    ]
+    wrong = [
+        (", ".join(f"{name}: {value}" for name, value in row.items()), f"{o.word}: {o.what}")
+        for row, o in outcomes
+        if o.word != "exact"
+    ]
+    write_text(
+        target,
+        render(
+            _TEMPLATE,
+            title="What goes with what",
+            outcome=said,
+            good=good,
+            main_page=PAGE,
+            options=OPTIONS,
+            table=table,
+            refused=list(_lines(REFUSED)),
+            excluded=list(_lines(EXCLUDED)),
+            wrong=wrong,
+        ),
+    )
+
+
+def _cell(digits: float | None, one: str, other: str) -> tuple[str, str]:
+    """The digits of the worst case with two options, and whether some of their values are apart."""
+    between = [rule for rule in REFUSED if {one, other} <= rule.when.keys()]
+    text = _EMPTY if digits is None else f"{digits:.0f}"
+    return text, "refused" if between else ""
+
+
+def _lines(rules: Sequence[Rule]) -> Iterator[tuple[str, str]]:
+    for rule in rules:
+        values = (f"{name}: {' or '.join(given)}" for name, given in rule.when.items())
+        yield " with ".join(values), rule.why
+
+
+def markdown() -> str:
+    """The options with their values, and what the program refuses, with the keys it names."""
+    lines = ["| option | values |", "|---|---|"]
+    lines += [f"| {name} | {', '.join(values)} |" for name, values in OPTIONS.items()]
+    lines += ["", "| refused together | why | keys that the message names |", "|---|---|---|"]
+    for rule, (what, why) in zip(REFUSED, _lines(REFUSED), strict=True):
+        lines.append(f"| {what} | {why} | {', '.join(f'`{key}`' for key in rule.keys)} |")
+    lines += ["", "| not tried together | why |", "|---|---|"]
+    lines += [f"| {what} | {why} |" for what, why in _lines(EXCLUDED)]
+    return "\n".join(lines) + "\n"
+
+
+def refusals() -> Iterator[tuple[Rule, dict[str, str]]]:
+    """Each rule of the program with each combination of its values."""
+    for rule in REFUSED:
+        for values in product(*rule.when.values()):
+            yield rule, dict(zip(rule.when, values, strict=True))

@@ -1,0 +1,103 @@
+"""The mesh of a row, and the groups of its faces."""
+
+from typing import Any
+
+import meshio
+import numpy as np
+
+from solver.mesh import generate
+
+from .options import SHAPED
+from .state import AXES, GAP, Body, States
+
+
+class Places(States):
+    """Where the faces of the bodies are."""
+
+    def recipe(self) -> dict[str, Any]:
+        """Of the mesh, its interface flat."""
+        start = self.start
+        bricks = []
+        for body in self.bodies:
+            low = [start, *[0.0] * (self.dim - 2), body.low]
+            high = [start + 1, *[1.0] * (self.dim - 2), body.low + 1]
+            block = {"cells": body.cells, "divisions": [body.divisions] * self.dim}
+            if body.cells.startswith(("PENTA", "PYRA")):
+                block["contact"] = "TRIA3" if body.cells in ("PENTA6", "PYRA5") else "TRIA6"
+            bricks.append({"name": body.name, "low": low, "high": high, "block": block})
+        return {"recipe": "bricks", "bricks": bricks}
+
+    def mesh(self) -> meshio.Mesh:
+        """The mesh, shaped and moved."""
+        mesh, start = generate(self.recipe(), "pairs"), self.start
+        points = mesh.points[:, : self.dim]
+        x, z = points[:, 0] - start, points[:, -1]
+        y = points[:, 1] if self.dim == 3 else 0 * x
+        shape = {
+            "flat": 0 * x,
+            "tilted": 0.2 * x,
+            "kinked": 0.1 * np.abs(x - 0.5),
+            "curved": 0.1 * (4 * x * (1 - x) + y * (1 - y)),
+        }[self.row["interface"]]
+        points[:, -1] += shape * np.clip(1 - np.abs(z), 0, None)
+        if self.row["gap"] == "meshed":
+            above = np.zeros(len(points), dtype=bool)
+            for block, cells in zip(mesh.cells, mesh.cell_sets["lower"], strict=True):
+                above[block.data[cells]] = True
+            points[~above] += GAP * self.normal
+        mesh.points[:, : self.dim] = (
+            self.placed.scale * points @ self.placed.turn.T + self.placed.origin
+        )
+        return mesh
+
+    def groups(self) -> dict[str, Any]:
+        start = self.start
+        groups: dict[str, Any] = {}
+        shift = GAP * self.normal if self.row["gap"] == "meshed" else 0 * self.normal
+
+        def plane(name: str, body: Body, axis: int, at: float) -> None:
+            point = np.zeros(self.dim)
+            point[axis] = at
+            if body.name != "lower":
+                point = point + shift
+            normal = self.placed.vector(np.eye(self.dim)[axis])
+            groups[name] = {
+                "within": body.name,
+                "plane": {"point": self.placed.point(point), "normal": normal},
+            }
+
+        for body in self.bodies:
+            for axis in range(self.dim - 1):
+                first = start if axis == 0 else 0.0
+                plane(f"{body.name}-{AXES[axis]}0", body, axis, first)
+                plane(f"{body.name}-{AXES[axis]}1", body, axis, first + 1)
+            up = self.dim - 1
+            inner = "top" if body.name == "lower" else "under"
+            if body.name == "cap":
+                plane("cap-under", body, up, 1.0)
+                plane("cap-top", body, up, 2.0)
+                continue
+            level = self.placed.affine(
+                self._up(), np.eye(self.dim), -(shift if body.name == "upper" else 0 * shift)
+            )
+            level = f"({level})/{self.placed.scale!r}" if self.placed.scale != 1 else level
+            across = self.placed.affine(
+                np.eye(self.dim)[0], np.eye(self.dim), np.array([-start, *[0.0] * (self.dim - 1)])
+            )
+            across = f"({across})/{self.placed.scale!r}" if self.placed.scale != 1 else across
+            if self.row["interface"] == "tilted":
+                level = f"({level}) - 0.2*({across})"
+            reach = 0.13 if self.row["interface"] in SHAPED else 1e-6
+            groups[f"{body.name}-{inner}"] = {
+                "within": body.name,
+                "where": f"{reach} - abs({level})",
+            }
+            plane(
+                f"{body.name}-{'base' if body.name == 'lower' else 'top'}",
+                body,
+                up,
+                -1.0 if body.name == "lower" else 1.0,
+            )
+        if self.row["also"] == "body force":
+            groups["lower-again"] = ["lower"]
+        return groups
