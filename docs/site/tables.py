@@ -18,6 +18,7 @@ from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.typed import Section, described, is_section, titles_of
 from solver.case.typed import fields as keys_of
 from solver.verification.checks import SCALES
+from tests.pairs.table import markdown
 
 _RECIPES = ("solver.mesh.recipes.blocks", "solver.mesh.recipes.mapped")
 
@@ -122,6 +123,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 FOLDER = Path(__file__).parents[1] / "design" / "tables"
 TABLES = {
+    "pairs": markdown,
     "case-keys": case_keys,
     "checks": checks,
     "recipes": recipes,

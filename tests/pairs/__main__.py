@@ -13,14 +13,14 @@ import yaml
 from .array import PAIRS, covering, smallest, store, stored
 from .judge import Outcome, tried
 from .options import Row
-from .page import markdown, page
+from .page import page
 from .problem import problem_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def main() -> int:
-    """Solve all rows; the page, the table of the documentation, and each failure reduced."""
+    """Solve all rows; the page, and each failure reduced."""
     strength, started = int(os.environ.get("STRENGTH", "2")), time.monotonic()
     rows = stored() if strength == PAIRS else covering(strength)
     if not rows:
@@ -37,7 +37,6 @@ def main() -> int:
     target = ROOT / "results/report/pairs.html"
     target.parent.mkdir(parents=True, exist_ok=True)
     page(target, outcomes, said, wrong == 0)
-    (ROOT / "docs/design/tables/pairs.md").write_text(markdown())
     print(f"{said}. Page: {target.relative_to(ROOT)}")
     return int(wrong > 0)
 

@@ -10,6 +10,7 @@ from solver.system.files import write_text
 
 from .judge import Outcome
 from .options import EXCLUDED, OPTIONS, REFUSED, Row, Rule
+from .table import lines_of
 
 _TEMPLATE = Path(__file__).with_name("page.html.jinja")
 _EMPTY = "–"
@@ -43,8 +44,8 @@ def page(target: Path, outcomes: Sequence[tuple[Row, Outcome]], said: str, good:
             main_page=PAGE,
             options=OPTIONS,
             table=table,
-            refused=list(_lines(REFUSED)),
-            excluded=list(_lines(EXCLUDED)),
+            refused=list(lines_of(REFUSED)),
+            excluded=list(lines_of(EXCLUDED)),
             wrong=wrong,
         ),
     )
@@ -55,24 +56,6 @@ def _cell(digits: float | None, one: str, other: str) -> tuple[str, str]:
     between = [rule for rule in REFUSED if {one, other} <= rule.when.keys()]
     text = _EMPTY if digits is None else f"{digits:.0f}"
     return text, "refused" if between else ""
-
-
-def _lines(rules: Sequence[Rule]) -> Iterator[tuple[str, str]]:
-    for rule in rules:
-        values = (f"{name}: {' or '.join(given)}" for name, given in rule.when.items())
-        yield " with ".join(values), rule.why
-
-
-def markdown() -> str:
-    """The options with their values, and what the program refuses, with the keys it names."""
-    lines = ["| option | values |", "|---|---|"]
-    lines += [f"| {name} | {', '.join(values)} |" for name, values in OPTIONS.items()]
-    lines += ["", "| refused together | why | keys that the message names |", "|---|---|---|"]
-    for rule, (what, why) in zip(REFUSED, _lines(REFUSED), strict=True):
-        lines.append(f"| {what} | {why} | {', '.join(f'`{key}`' for key in rule.keys)} |")
-    lines += ["", "| not tried together | why |", "|---|---|"]
-    lines += [f"| {what} | {why} |" for what, why in _lines(EXCLUDED)]
-    return "\n".join(lines) + "\n"
 
 
 def refusals() -> Iterator[tuple[Rule, dict[str, str]]]:

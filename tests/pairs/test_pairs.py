@@ -9,7 +9,7 @@ from tests.pairs.array import missing, stored
 from tests.pairs.faults import FAULTS
 from tests.pairs.judge import tried
 from tests.pairs.options import EXCLUDED, OPTIONS, PLAIN, REFUSED, Rule, possible
-from tests.pairs.page import markdown, refusals
+from tests.pairs.page import refusals
 from tests.pairs.problem import problem_of
 
 ROWS = stored()
@@ -66,11 +66,6 @@ def test_what_does_not_go_together_is_refused_by_both_keys(rule, row):
     assert "\n" not in outcome.what
     for key in rule.keys:
         assert key in outcome.what, outcome.what
-
-
-def test_the_table_of_the_documentation_is_current(request):
-    path = request.config.rootpath / "docs/design/tables/pairs.md"
-    assert path.read_text() == markdown()
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
