@@ -69,12 +69,12 @@ POINTS = ("quadrature", "node_to_segment")
 REFUSED = (
     Rule(
         {"friction": FRICTION, "treatment": _not("treatment", "lac")},
-        "friction",
+        "friction acts on one pressure for each macro-element",
         ("treatment", "friction"),
     ),
     Rule(
         {"friction": FRICTION, "normal": _not("normal", "element")},
-        "friction",
+        "friction acts along the faces' own normals",
         ("normal", "friction"),
     ),
     Rule({"friction": FRICTION, "stabilised": ("yes",)}, "friction", ("stabilised", "friction")),
@@ -85,7 +85,7 @@ REFUSED = (
     ),
     Rule(
         {"treatment": ("uncut", "node_to_segment", *NODAL), "stabilised": ("yes",)},
-        "no such pressure",
+        "no pressure that could be stabilised",
         ("stabilised", "treatment"),
     ),
     Rule(
@@ -103,7 +103,7 @@ REFUSED = (
             "treatment": ("node_to_segment",),
             "slave cells": ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
         },
-        "forces",
+        "nodal forces of a uniform pressure vanish or pull",
         ("treatment", "slave"),
     ),
     Rule(
@@ -138,7 +138,7 @@ REFUSED = (
             "master cells": ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
             "form": ("exchanged",),
         },
-        "forces",
+        "nodal forces of a uniform pressure vanish or pull",
         ("treatment", "slave"),
     ),
     Rule(

@@ -13,7 +13,7 @@ from .options import EXCLUDED, OPTIONS, REFUSED, Row, Rule
 from .table import lines_of
 
 _TEMPLATE = Path(__file__).with_name("page.html.jinja")
-_EMPTY = "–"
+_EMPTY, _STIFF = "–", "stiff master"
 
 
 def page(target: Path, outcomes: Sequence[tuple[Row, Outcome]], said: str, good: bool) -> None:
@@ -23,6 +23,8 @@ def page(target: Path, outcomes: Sequence[tuple[Row, Outcome]], said: str, good:
         error = outcome.error if outcome.word == "exact" else 1.0
         found = min(16.0, -log10(max(error, 1e-16)))
         for pair in map(frozenset, combinations(row, 2)):
+            if row["materials"] == _STIFF and "materials" not in pair:
+                continue  # fewer digits by themselves
             digits[pair] = min(digits.get(pair, 16.0), found)
     names = list(OPTIONS)
     table = [
