@@ -186,7 +186,7 @@ $(SITE)/installed-%: requirements-%.txt $(SITE)/installed-run
 	@touch $@
 
 # INSTALLED=yes takes the environment as it is. Its Python finds the project from any folder.
-environment:
+environment: ## install the locked packages alone: enough to solve cases of your own
 ifndef INSTALLED
 	@$(MAKE) --silent $(SITE)/installed-run
 	@grep -qxsF "$(CURDIR)" $(SITE)/mortarcheck.pth || echo "$(CURDIR)" > $(SITE)/mortarcheck.pth

@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -90,6 +91,10 @@ def test_the_wheel_holds_every_file_of_the_package(installed):
 def test_the_command_solves_checks_and_reports(installed, fresh, tmp_path):
     command = installed / "packages" / "bin" / "mortarcheck"
     assert fresh(command, "--version").stdout == "mortarcheck 0.1.0\n"
+    told = fresh(command, "--version", "--verbose").stdout.splitlines()
+    assert told[0] == "mortarcheck 0.1.0"
+    assert [line.split()[0] for line in told[1:4]] == ["python", "numpy", "scipy"]
+    assert told[-1].startswith(platform.system())
     made = fresh(command, "new", "block").stdout
     assert made.endswith("next: mortarcheck solve block.yaml -o block.vtkhdf\n")
     solved = fresh(command, "solve", "block.yaml", "-o", "r.vtkhdf", "--verdict", "verdict.json")

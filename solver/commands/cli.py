@@ -8,6 +8,7 @@ command that is run is imported, and what it needs when it runs, so that help co
 import argparse
 import io
 import os
+import platform
 import sys
 import traceback
 import warnings
@@ -142,7 +143,12 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", nargs=0, action=_Version, help="print the version and end")
+    parser.add_argument(
+        "--version",
+        nargs=0,
+        action=_Version,
+        help="print the version and end; with --verbose those of packages, for a report of a fault",
+    )
     parser.set_defaults(threads=None)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = next((word for word in arguments if not word.startswith("-")), "")
@@ -167,8 +173,14 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked up only then."""
+    """Prints the version, which is looked up only then; `--verbose` those of packages too."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         print(PROJECT, project_version())
+        if "--verbose" in sys.argv:
+            from ..verification.provenance import versions
+
+            others = {name: found for name, found in versions().items() if name != PROJECT}
+            print("\n".join(f"{name} {found}" for name, found in others.items()))
+            print(platform.platform())
         parser.exit()

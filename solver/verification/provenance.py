@@ -26,9 +26,7 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
     `case` and `mesh` are the files that were read; `mesh` is None where it was made in memory.
     """
     return {
-        "python": platform.python_version(),
-        PROJECT: project_version(),
-        **{package: _version(package) for package in PACKAGES},
+        **versions(),
         "command": shlex.join(_command()),
         "revision": _revision(),
         "case_sha256": _sha256(case),
@@ -39,6 +37,12 @@ def gather(case: Path, mesh: Path | None) -> dict[str, str | int]:
         "platform": platform.platform(),
         "time_utc": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+
+
+def versions() -> dict[str, str]:
+    """The versions of Python, of this project and of the packages that results depend on."""
+    packages = {package: _version(package) for package in PACKAGES}
+    return {"python": platform.python_version(), PROJECT: project_version()} | packages
 
 
 @cache
