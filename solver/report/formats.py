@@ -144,7 +144,7 @@ def bar(seconds: Mapping[str, float], total: float) -> Markup:
 
 
 KINDS = {
-    "analytical": "an exact solution",
+    "analytical": "values that are known exactly",
     "manufactured": "a solution chosen first, with loads derived from it",
     "refined": "our own result on a much finer mesh",
     "other_code": "another code's result",

@@ -166,7 +166,7 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
     first = [row[0] for row in rows]
     heads = [cell for cell in first if cell.startswith("Reference: ")]
     assert heads == [
-        "Reference: an exact solution",
+        "Reference: values that are known exactly",
         "Reference: our own result on a much finer mesh",
         "Reference: another code's result: solver 14.6",
         "Reference: a solution chosen first, with loads derived from it",
@@ -180,7 +180,7 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
     kinds = {row[0]: row[1:] for row in rows if row and row[0] in ("refined", "other code")}
     assert kinds["refined"] == ["our own result on a much finer mesh", "–", "1", "± 2.0e-03"]
     assert kinds["other code"] == ["another code's result: solver 14.6", "–", "2", "–"]
-    assert ["analytical", "an exact solution", "nested_cylinders", "1", "exact"] in rows
+    assert ["analytical", "values that are known exactly", "nested_cylinders", "1", "exact"] in rows
 
 
 def test_the_page_goes_from_problem_to_figure_to_verdict(file, tmp_path):

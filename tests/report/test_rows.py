@@ -21,5 +21,7 @@ def test_a_number_is_no_exact_solution():
 
 
 def test_a_field_is_compared_with_an_exact_solution():
-    assert row(("force", 12.5), ("multiplier", 25.0)).origin(KINDS) == "an exact solution"
-    assert row().origin(KINDS) == "an exact solution"
+    assert (
+        row(("force", 12.5), ("multiplier", 25.0)).origin(KINDS) == "values that are known exactly"
+    )
+    assert row().origin(KINDS) == "values that are known exactly"
