@@ -172,9 +172,7 @@ def test_kinds_of_reference_are_kept_apart_with_uncertainty_code_and_version(tmp
         "Reference: a solution chosen first, with loads derived from it",
     ]
     html = (tmp_path / "fam.html").read_text()
-    heads = [
-        html.index(f"Reference: {what}") for what in ("an exact", "our own", "another", "a sol")
-    ]
+    heads = [html.index(f"Reference: {what}") for what in ("values", "our own", "another", "a sol")]
     at = [html.index(f'href="#fam/{name}"') for name in "abced"]
     assert heads[0] < at[0] < heads[1] < at[1] < heads[2] < at[2] < at[3] < heads[3] < at[4]
     kinds = {row[0]: row[1:] for row in rows if row and row[0] in ("refined", "other code")}
