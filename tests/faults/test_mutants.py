@@ -6,6 +6,7 @@ import pytest
 
 from tests.faults.mutants import MUTANTS
 from tests.faults.planted import checks, planted, reason, verdict
+from tests.pairs.faults import FAULTS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "design" / "faults.md"
 
@@ -35,6 +36,10 @@ def test_pressure_by_forces_does_not_depend_on_the_gap_operator():
 def test_the_page_lists_them_all():
     listed = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if "| `" in line]
     rows = [f"| `{m.name}` | {m.what} | {m.case} |" for m in MUTANTS]
-    assert listed == rows
-    assert len({m.name for m in MUTANTS}) == len(rows)
+    meeting = [
+        f"| `{fault.name}` | {fault.what} | {'; '.join(map(': '.join, fault.options.items()))} |"
+        for fault in FAULTS
+    ]
+    assert listed == rows + meeting
+    assert len({m.name for m in (*MUTANTS, *FAULTS)}) == len(rows + meeting)
     assert f"It catches {len(rows)} of {len(rows)} faults." in PAGE.read_text(encoding="utf-8")
