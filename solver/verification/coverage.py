@@ -34,20 +34,20 @@ def _passed_by(solution: Solution, zone: ZoneResult) -> np.ndarray:
     Where both surfaces end on the same plane, the normal of a facet leans against the plane by
     half the angle θ to the next facet. Over a distance g it moves there by g tan(θ/2).
     """
-    passed = np.zeros(len(zone.area))
-    (one, other), rim = macro_neighbours(zone)[0].T, macro_neighbours(zone)[1]
-    if zone.meshed_gap is None or not len(one):
-        return passed
-    normal = zone.normal
-    lean = np.linalg.norm(normal[one] - normal[other], axis=1)
-    lean /= np.linalg.norm(normal[one] + normal[other], axis=1)
-    np.maximum.at(passed, one, lean)
-    np.maximum.at(passed, other, lean)
-    moved = _WARPED * passed * rim * np.abs(zone.meshed_gap)
-    return moved / _side(solution.mesh.points, zone)
+    tangent = np.zeros(len(zone.area))
+    if zone.meshed_gap is None or zone.flat:
+        return tangent
+    pairs, rim = macro_neighbours(zone)
+    one, other = pairs.T
+    lean = np.linalg.norm(zone.normal[one] - zone.normal[other], axis=1)
+    lean /= np.linalg.norm(zone.normal[one] + zone.normal[other], axis=1)
+    np.maximum.at(tangent, one, lean)
+    np.maximum.at(tangent, other, lean)
+    moved = _WARPED * tangent * rim * np.abs(zone.meshed_gap)
+    return moved / _shortest_side(solution.mesh.points, zone)
 
 
-def _side(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
+def _shortest_side(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
     """The shortest side (m,) of the sub-faces of each macro-element; in 2D the length."""
     shortest = np.full(len(zone.area), np.inf)
     for name, nodes, macro in zone.faces:

@@ -48,8 +48,6 @@ _IN_LINE = 1e-9
 _ROUNDING = 1e-13
 # A macro-element that is covered by less than this has a mean of another place.
 _COVERED = 0.99
-# Normals that differ by less are those of a flat surface.
-_FLAT = 1e-9
 
 
 def unresolved(solution: Solution) -> str:
@@ -75,14 +73,13 @@ def unresolved(solution: Solution) -> str:
 
 def _remedies(solution: Solution, zone: Zone, result: ZoneResult) -> str:
     """What the case admits of: a rigid side is always master, friction has no stabilised form."""
-    flat = bool((np.ptp(result.normal, axis=0) < _FLAT).all())  # HEXA20 keep bent faces otherwise
     lac, cells = zone.treatment == "lac", {c for b in solution.bodies for c in b.cells}
     admitted = {
         "exchange slave and master": solution.deformable[result.master_nodes].any(),
         "set `stabilised: true`": lac and not zone.friction and not zone.stabilised,
         "cut with `hexahedra: hexahedra`": lac
         and zone.hexahedra != "hexahedra"
-        and bool(cells & ({"HEXA8", "HEXA20"} if flat else {"HEXA8"})),
+        and bool(cells & ({"HEXA8", "HEXA20"} if result.flat else {"HEXA8"})),  # bent: refused
         "refine the surfaces": True,
     }
     *others, last = [words for words, possible in admitted.items() if possible]

@@ -154,11 +154,7 @@ def read_zone(
     if "edges" in group:
         parts["resultants"].edges = _read(Edges, group["edges"])
     masters = [(kind, data[()]) for kind, data in group["master_faces"].items()]
-    found = _read(ZoneResult, group, name=name, faces=faces, master_faces=masters, **parts)
-    for field in ("area", "multiplier", "gap", "closed", "coverage", "centre", "normal"):
-        if np.shape(getattr(found, field))[:1] != (len(found.closed),):
-            raise ValueError(f"zone {name}: {field} is not by macro-element")
-    return found
+    return _read(ZoneResult, group, name=name, faces=faces, master_faces=masters, **parts)
 
 
 def _write(group: h5py.Group, item: Any) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from covertable import make
 
-from .options import EXCLUDED, OPTIONS, PLAIN, PLANE, REFUSED, SOLID, Row, possible
+from .options import EXCLUDED, OPTIONS, PLANE, REFUSED, SOLID, Row, plain_in, possible
 
 PAIRS = 2
 _STORED = Path(__file__).with_name("rows.json")
@@ -45,7 +45,7 @@ def _rows(domain: dict[str, tuple[str, ...]], strength: int) -> list[Row]:
 def stored() -> list[Row]:
     """The rows for pairs that are kept, half a minute to make; none where options have changed."""
     rows = [dict(zip(OPTIONS, row, strict=True)) for row in json.loads(_STORED.read_text())]
-    whole = all(possible(row) for row in rows) and not any(missing(rows))
+    whole = all(map(possible, rows)) and not any(missing(rows))
     return rows if whole else []
 
 
@@ -56,27 +56,16 @@ def store(rows: list[Row]) -> None:
 
 
 def missing(rows: list[Row], strength: int = PAIRS) -> Iterator[Part]:
-    """The combinations that no row covers and that some possible row could."""
+    """The combinations that no row covers and no rule excludes."""
     for domain in DOMAINS:
         mine = [row for row in rows if row["space"] in domain["space"]]
         covered = {part for row in mine for part in parts(row, strength)}
-        for part in wanted(domain, strength):
-            if part not in covered and _completed(dict(part), domain):
-                yield part
-
-
-def _completed(part: dict[str, str], domain: dict[str, tuple[str, ...]]) -> bool:
-    """Whether a row can have a part, by search: options that rules tie to it first."""
-    tied = {name for rule in (*REFUSED, *EXCLUDED) if rule.when.keys() & part for name in rule.when}
-    free = sorted((name for name in domain if name not in part), key=lambda name: name not in tied)
-
-    def filled(row: dict[str, str], left: list[str]) -> bool:
-        if not left:
-            return True
-        longer = ({**row, left[0]: value} for value in domain[left[0]])
-        return any(possible(one) and filled(one, left[1:]) for one in longer)
-
-    return filled(part, free)
+        alone = {name: values[0] for name, values in domain.items() if len(values) == 1}
+        for names in combinations(domain, strength):
+            for values in product(*(domain[name] for name in names)):
+                part = tuple(zip(names, values, strict=True))
+                if part not in covered and possible(alone | dict(part)):
+                    yield part
 
 
 def parts(row: Row, strength: int) -> Iterator[Part]:
@@ -84,20 +73,9 @@ def parts(row: Row, strength: int) -> Iterator[Part]:
     return combinations([(name, row[name]) for name in OPTIONS], strength)
 
 
-def wanted(domain: dict[str, tuple[str, ...]], strength: int) -> Iterator[Part]:
-    """The combinations of values of a domain that no rule excludes."""
-    for names in combinations(domain, strength):
-        for values in product(*(domain[name] for name in names)):
-            part = tuple(zip(names, values, strict=True))
-            if possible({"space": domain["space"][0], **dict(part)}):
-                yield part
-
-
 def smallest(row: Row, fails: Callable[[Row], bool]) -> Row:
     """The row with as many plain values as still let it fail."""
-    solid = row["space"] == "solid"
-    cells = dict.fromkeys(_CELLS, "HEXA8" if solid else "QUAD4")
-    plain = {**PLAIN, "space": "solid" if solid else "strain", **cells}
+    plain = plain_in("solid" if row["space"] == "solid" else "strain")
     changed = True
     while changed:
         changed = False

@@ -24,7 +24,6 @@ class Fault:
     attribute: str
     patch: Callable[[Any], Any]
     space: str = "strain"
-    cells: str = "QUAD4"
 
     def plant(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Plant it."""
@@ -97,7 +96,6 @@ FAULTS = (
         "__init__",
         _sorted_rows,
         "solid",
-        "HEXA8",
     ),
     Fault(
         "interference-exchanged",

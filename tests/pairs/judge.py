@@ -24,13 +24,12 @@ COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 class Outcome:
     """What came of a row: its largest error and where, or the line that ended it.
 
-    `word`: exact, refused or wrong. `allowed`: the error that counts as exact.
+    `word`: exact, refused or wrong.
     """
 
     word: str
     error: float
     what: str
-    seconds: float = 0.0
 
 
 def tried(row: Row) -> Outcome:
@@ -63,13 +62,12 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
     """The largest error of each field, over the scale of the field."""
     placed, dim = problem.placed, len(problem.placed.origin)
     scale = max(float(np.abs(body.stress).max()) for body in problem.bodies)
-    names = {i: body.name for i, body in enumerate(solution.bodies)}
+    exact_of = {body.name: body for body in problem.bodies}
     found: dict[str, float] = {}
     moved, wanted = solution.displacement, np.zeros_like(solution.displacement)
     seen = np.zeros(len(moved), dtype=bool)
-    for number, name in names.items():
-        body = next((b for b in problem.bodies if b.name == name), None)
-        if body is None:
+    for number, info in enumerate(solution.bodies):
+        if (body := exact_of.get(info.name)) is None:
             continue
         mine = solution.body == number
         places = (solution.mesh.points[mine, :dim] - placed.origin) @ placed.turn / placed.scale
@@ -85,20 +83,19 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
             checked = [k for k, (i, j) in enumerate(COMPONENTS) if max(i, j) < len(body.stress)]
             exact = np.array([stress[COMPONENTS[k]] for k in checked])
             error = np.abs(solution.stress[mine][:, checked] - exact).max() / scale
-            found[f"stress of {name}"] = float(error)
-    assert seen.any(), f"no body of the case among {names}"
+            found[f"stress of {body.name}"] = float(error)
+    assert seen.any(), f"no body of the case among {solution.bodies}"
     strained = max(float(np.abs(b.stress).max()) / b.young for b in problem.bodies)
     size = max(float(np.abs(wanted).max()), placed.scale * strained)
     found["displacement"] = float(np.abs(moved - wanted)[seen].max() / size)
     for zone in solution.zones:
         body = problem.bodies[0 if zone.name == "one" else -1]
-        turn = np.zeros((dim, dim))
-        turn = placed.turn @ body.stress[:dim, :dim] @ placed.turn.T
+        stress = placed.turn @ body.stress[:dim, :dim] @ placed.turn.T
         normal = zone.normal[:, :dim]
-        traction = normal @ turn
+        traction = normal @ stress
         pressed = np.einsum("md,md->m", traction, normal)
         found[f"pressure of {zone.name}"] = float(np.abs(zone.multiplier + pressed).max() / scale)
-        found[f"gap of {zone.name}"] = float(np.abs(zone.gap).max() / (placed.scale))
+        found[f"gap of {zone.name}"] = float(np.abs(zone.gap).max() / placed.scale)
         if zone.friction is not None:
             along = traction - pressed[:, None] * normal
             error = np.abs(zone.friction.friction_traction[:, :dim] - along).max() / scale

@@ -60,6 +60,17 @@ class Rule(NamedTuple):
         return all(row.get(name) in values for name, values in self.when.items())
 
 
+def _of_slave(
+    cells: tuple[str, ...],
+    when: Mapping[str, tuple[str, ...]],
+    why: str,
+    keys: tuple[str, ...] = (),
+) -> tuple[Rule, Rule]:
+    """A rule of the cells that are the slave's: the other ones where both are exchanged."""
+    exchanged = {**when, "master cells": cells, "form": ("exchanged",)}
+    return Rule({**when, "slave cells": cells}, why, keys), Rule(exchanged, why, keys)
+
+
 def _not(name: str, *values: str) -> tuple[str, ...]:
     return tuple(value for value in OPTIONS[name] if value not in values)
 
@@ -77,7 +88,11 @@ REFUSED = (
         "friction acts along the faces' own normals",
         ("normal", "friction"),
     ),
-    Rule({"friction": FRICTION, "stabilised": ("yes",)}, "friction", ("stabilised", "friction")),
+    Rule(
+        {"friction": FRICTION, "stabilised": ("yes",)},
+        "contact with friction does not give way",
+        ("stabilised", "friction"),
+    ),
     Rule(
         {"treatment": POINTS, "normal": _not("normal", "element")},
         "normals of its own",
@@ -93,53 +108,27 @@ REFUSED = (
         "two multipliers of one node",
         ("treatment", "cyclic"),
     ),
-    Rule(
-        {"treatment": ("nodal_dual",), "slave cells": QUADRATIC},
+    *_of_slave(
+        QUADRATIC,
+        {"treatment": ("nodal_dual",)},
         "built of linear functions",
         ("treatment", "slave"),
     ),
-    Rule(
-        {
-            "treatment": ("node_to_segment",),
-            "slave cells": ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
-        },
+    *_of_slave(
+        ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
+        {"treatment": ("node_to_segment",)},
         "nodal forces of a uniform pressure vanish or pull",
         ("treatment", "slave"),
     ),
-    Rule(
+    *_of_slave(
+        ("HEXA20",),
         {
             "hexahedra": ("hexahedra",),
             "interface": ("curved",),
-            "slave cells": ("HEXA20",),
             "treatment": ("lac", "quadrature"),
         },
         "cells cut askew leave bent faces",
         ("hexahedra", "HEXA20"),
-    ),
-    Rule(
-        {
-            "hexahedra": ("hexahedra",),
-            "interface": ("curved",),
-            "master cells": ("HEXA20",),
-            "treatment": ("lac", "quadrature"),
-            "form": ("exchanged",),
-        },
-        "cells cut askew leave bent faces",
-        ("hexahedra", "HEXA20"),
-    ),
-    Rule(
-        {"treatment": ("nodal_dual",), "master cells": QUADRATIC, "form": ("exchanged",)},
-        "built of linear functions",
-        ("treatment", "slave"),
-    ),
-    Rule(
-        {
-            "treatment": ("node_to_segment",),
-            "master cells": ("HEXA20", "PENTA15", "PYRA13", "TETRA10"),
-            "form": ("exchanged",),
-        },
-        "nodal forces of a uniform pressure vanish or pull",
-        ("treatment", "slave"),
     ),
     Rule(
         {"master": ("plane",), "form": ("exchanged",)},
@@ -159,16 +148,9 @@ EXCLUDED = (
     Rule({"space": ("solid",), "master cells": PLANE}, "cells of another dimension"),
     Rule({"slave cells": PLANE, "master cells": SOLID}, "cells of another dimension"),
     Rule({"slave cells": SOLID, "master cells": PLANE}, "cells of another dimension"),
-    Rule(
-        {"treatment": ("uncut",), "slave cells": ("TETRA4", "PENTA6", "PYRA5")},
-        "faces outnumber nodes: why LAC cuts",
-    ),
-    Rule(
-        {
-            "treatment": ("uncut",),
-            "master cells": ("TETRA4", "PENTA6", "PYRA5"),
-            "form": ("exchanged",),
-        },
+    *_of_slave(
+        ("TETRA4", "PENTA6", "PYRA5"),
+        {"treatment": ("uncut",)},
         "faces outnumber nodes: why LAC cuts",
     ),
     Rule({"friction": SHEARED, "interface": SHAPED}, "a hydrostatic state has no shear"),
@@ -231,6 +213,8 @@ EXCLUDED = (
     Rule({"supports": ("together",), "form": ("rotated",)}, "components along axes"),
     Rule({"space": ("axisymmetric",), "supports": ("cyclic",)}, "no sides"),
     Rule({"space": ("axisymmetric",), "form": ("rotated",)}, "the axis stays"),
+    Rule({"master": ("plane",), "supports": ("springs", "together")}, "no elastic body is loaded"),
+    Rule({"master": ("plane",), "load": ("traction", "force")}, "no elastic body is loaded"),
     Rule(
         {"master": RIGID, "supports": ("springs", "together"), "second zone": ("none",)},
         "no elastic body is loaded",
@@ -240,6 +224,10 @@ EXCLUDED = (
         "no elastic body is loaded",
     ),
     Rule({"load": ("traction", "force"), "supports": ("imposed",)}, "displacements are imposed"),
+    Rule(
+        {"load": ("traction", "force"), "friction": ("slip", "slip back")},
+        "displacements are imposed",
+    ),
     Rule(
         {"interface": SHAPED, "normal": ("nodal", "master")}, "the faces' own normals alone keep it"
     ),
@@ -291,3 +279,9 @@ EXCLUDED = (
 def possible(row: Row) -> bool:
     """Whether the values of a row, or of a part of one, go together."""
     return not any(rule.applies(row) for rule in (*REFUSED, *EXCLUDED))
+
+
+def plain_in(space: str) -> dict[str, str]:
+    """The plain row in the plane or in space."""
+    cells = "HEXA8" if space == "solid" else "QUAD4"
+    return {**PLAIN, "space": space, "slave cells": cells, "master cells": cells}

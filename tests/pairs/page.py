@@ -1,7 +1,7 @@
-"""What goes with what: a page with the digits of a run, and a table of the documentation."""
+"""What goes with what: a page with the digits of a run."""
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations, product
+from collections.abc import Sequence
+from itertools import combinations
 from math import log10
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from solver.report.formats import PAGE, render
 from solver.system.files import write_text
 
 from .judge import Outcome
-from .options import EXCLUDED, OPTIONS, REFUSED, Row, Rule
+from .options import EXCLUDED, OPTIONS, REFUSED, Row
 from .table import lines_of
 
 _TEMPLATE = Path(__file__).with_name("page.html.jinja")
@@ -58,10 +58,3 @@ def _cell(digits: float | None, one: str, other: str) -> tuple[str, str]:
     between = [rule for rule in REFUSED if {one, other} <= rule.when.keys()]
     text = _EMPTY if digits is None else f"{digits:.0f}"
     return text, "refused" if between else ""
-
-
-def refusals() -> Iterator[tuple[Rule, dict[str, str]]]:
-    """Each rule of the program with each combination of its values."""
-    for rule in REFUSED:
-        for values in product(*rule.when.values()):
-            yield rule, dict(zip(rule.when, values, strict=True))

@@ -8,7 +8,7 @@ import numpy as np
 from solver.mesh import generate
 
 from .options import SHAPED
-from .state import AXES, GAP, Body, States
+from .state import AXES, Body, States
 
 
 class Places(States):
@@ -44,22 +44,22 @@ class Places(States):
             above = np.zeros(len(points), dtype=bool)
             for block, cells in zip(mesh.cells, mesh.cell_sets["lower"], strict=True):
                 above[block.data[cells]] = True
-            points[~above] += GAP * self.normal
+            points[~above] += self.apart
         mesh.points[:, : self.dim] = (
             self.placed.scale * points @ self.placed.turn.T + self.placed.origin
         )
         return mesh
 
     def groups(self) -> dict[str, Any]:
+        """The sides, ends and contact surfaces of all bodies."""
         start = self.start
         groups: dict[str, Any] = {}
-        shift = GAP * self.normal if self.row["gap"] == "meshed" else 0 * self.normal
 
         def plane(name: str, body: Body, axis: int, at: float) -> None:
             point = np.zeros(self.dim)
             point[axis] = at
             if body.name != "lower":
-                point = point + shift
+                point = point + self.apart
             normal = self.placed.vector(np.eye(self.dim)[axis])
             groups[name] = {
                 "within": body.name,
@@ -77,20 +77,15 @@ class Places(States):
                 plane("cap-under", body, up, 1.0)
                 plane("cap-top", body, up, 2.0)
                 continue
-            level = self.placed.affine(
-                self._up(), np.eye(self.dim), -(shift if body.name == "upper" else 0 * shift)
-            )
-            level = f"({level})/{self.placed.scale!r}" if self.placed.scale != 1 else level
-            across = self.placed.affine(
-                np.eye(self.dim)[0], np.eye(self.dim), np.array([-start, *[0.0] * (self.dim - 1)])
-            )
-            across = f"({across})/{self.placed.scale!r}" if self.placed.scale != 1 else across
-            if self.row["interface"] == "tilted":
-                level = f"({level}) - 0.2*({across})"
-            reach = 0.13 if self.row["interface"] in SHAPED else 1e-6
+            # its height above the interface, which is 0.2 x where that is tilted
+            normal = self.normal / self.normal[-1]
+            at = -normal @ (self.apart if body.name == "upper" else 0 * self.apart)
+            at -= normal[0] * start
+            height = self.placed.affine(normal, np.eye(self.dim), at * self._up())
+            reach = self.placed.scale * (0.13 if self.row["interface"] in SHAPED else 1e-6)
             groups[f"{body.name}-{inner}"] = {
                 "within": body.name,
-                "where": f"{reach} - abs({level})",
+                "where": f"{reach!r} - abs({height})",
             }
             plane(
                 f"{body.name}-{'base' if body.name == 'lower' else 'top'}",

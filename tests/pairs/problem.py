@@ -15,7 +15,7 @@ from solver.mesh.transforms import transform
 
 from .options import RIGID, Row
 from .places import Places
-from .state import AXES, GAP, MU, PRESSURE, SLIDE, STRAIN, Body, Placed
+from .state import AXES, GAP, MU, STRAIN, Body, Placed
 
 # The factor of the last step, where there are several.
 _LAST = 0.4
@@ -37,12 +37,10 @@ _MULTIPLIED = {
 class Problem:
     """A case on its mesh, as it is solved, and what must come out."""
 
-    row: Row
     case: Case
     mesh: meshio.Mesh
     bodies: list[Body]
     placed: Placed
-    pressure: float
     text: dict[str, Any]
 
 
@@ -75,13 +73,13 @@ class _Builder(Places):
         case, mesh = case.as_solved(swapped=self.row["form"] == "exchanged"), self.mesh()
         if case.transform:
             mesh = transform(mesh, case.transform, "pairs")
-        return Problem(self.row, case, mesh, self.bodies, self.placed, PRESSURE * self.unit, text)
+        return Problem(case, mesh, self.bodies, self.placed, text)
 
     def _zone(self) -> dict[str, Any]:
         row = self.row
         zone: dict[str, Any] = {"name": "one", "slave": "lower-top", "master": "upper-under"}
-        if row["master"] in RIGID:
-            zone["master"] = "wall" if row["master"] == "plane" else "upper-under"
+        if row["master"] == "plane":
+            zone["master"] = "wall"
         if row["friction"] != "none":
             zone["friction"] = MU
         for key in ("treatment", "normal", "hexahedra", "recovery"):
@@ -115,9 +113,6 @@ class _Builder(Places):
         if row["form"] == "exchanged":
             zone["slave"], zone["master"] = zone["master"], zone["slave"]
         return zone
-
-    def _traction(self, body: Body, outward: np.ndarray) -> list[float]:
-        return self.placed.vector(body.stress[: self.dim, : self.dim] @ outward)
 
     def _text(self) -> dict[str, Any]:
         row = self.row
@@ -209,8 +204,7 @@ class _Builder(Places):
         pressed = outward * (outward @ traction)
         self._load(group, "traction", self.placed.vector(pressed), name="press")
         if (shear := traction - pressed).any():
-            area = self.placed.scale ** (self.dim - 1)
-            force = [area * v for v in self.placed.vector(shear)]
+            force = [self.area * v for v in self.placed.vector(shear)]
             self._load(group, "force", force, name="shear")
 
     def _far_end(self, body: Body) -> None:
@@ -277,16 +271,11 @@ class _Builder(Places):
         row = self.row
         if row["master"] == "plane":
             up = self.placed.vector(-self.normal)
-            start = np.array([1.0 if self.axisymmetric else 0.0, *[0.0] * (self.dim - 1)])
-            point = np.zeros(self.dim) if row["interface"] == "flat" else start * 0
-            if row["gap"] == "meshed":
-                point = point + GAP * self.normal
-            body: dict[str, Any] = {"plane": {"point": self.placed.point(point), "normal": up}}
-            shift = self._wall_shift()
+            point = self.placed.point(self.apart)
+            body: dict[str, Any] = {"plane": {"point": point, "normal": up}}
         else:
             body = {"rigid": True}
-            shift = self.bodies[1].shift
-        move = self.placed.scale * self.placed.turn @ shift
+        move = self.placed.scale * self.placed.turn @ self.moved
         axes = [self.dim - 1] if self.axisymmetric else range(self.dim)
         motion = {AXES[a]: float(move[a]) for a in axes if move[a]}
         if row["master"] == "rigid, by force":
@@ -298,11 +287,6 @@ class _Builder(Places):
         if motion or "force" in body:
             body |= self.named
         return {"wall" if row["master"] == "plane" else "upper": body}
-
-    def _wall_shift(self) -> np.ndarray:
-        gap = {"meshed": GAP, "clearance": GAP, "interference": -GAP}.get(self.row["gap"], 0.0)
-        slide = SLIDE if self.row["friction"] == "slip" else 0.0
-        return slide * self.along - gap * self.normal
 
     def _push(self) -> list[float]:
         """The force on the rigid body in zone one, less that of zone two."""

@@ -119,6 +119,18 @@ class States:
         """The traction of friction along the interface, over the pressure, on the lower body."""
         return {"stick": 0.5 * MU, "slip": MU, "slip back": -MU}.get(self.row["friction"], 0.0)
 
+    @property
+    def apart(self) -> np.ndarray:
+        """How far the upper bodies are meshed from where they touch."""
+        return GAP * self.normal if self.row["gap"] == "meshed" else 0 * self.normal
+
+    @property
+    def moved(self) -> np.ndarray:
+        """How far the master moves at the interface: it slides, and closes the gap."""
+        slide = {"slip": SLIDE, "slip back": -SLIDE}.get(self.row["friction"], 0.0)
+        gap = {"meshed": GAP, "clearance": GAP, "interference": -GAP}.get(self.row["gap"], 0.0)
+        return slide * self.along - gap * self.normal
+
     def _states(self) -> Iterator[Body]:
         row = self.row
         poisson = 0.4999 if row["materials"] == "nearly incompressible" else POISSON
@@ -131,20 +143,18 @@ class States:
             sizes = (2, 2)
         elif row["interface"] == "kinked":
             sizes = {"coarser": (4, 2), "as fine": (2, 2), "finer": (2, 4)}[row["master size"]]
-        shift = np.zeros(self.dim)
-        moved = shift.copy()
-        if row["friction"] in ("slip", "slip back"):
-            moved = moved + SLIDE * self.along
-        if row["friction"] == "slip back":
-            moved = -moved
-        gap = {"meshed": GAP, "clearance": GAP, "interference": -GAP}.get(row["gap"], 0.0)
-        moved = moved - gap * self.normal
-        yield self._body("lower", -1.0, sizes[0], 1.0, poisson, shift, False, not rigid)
-        if row["master"] != "plane":
-            yield self._body("upper", 0.0, sizes[1], stiff, poisson, moved, rigid, True)
-        if self.second:
-            third = moved
-            yield self._body("cap", 1.0, 3, stiff, poisson, third, False, not rigid)
+        rest = np.zeros(self.dim)
+        yield self._body("lower", -1.0, sizes[0], 1.0, poisson, rest, False, not rigid)
+        if row["master"] == "plane":
+            return
+        upper = self._body("upper", 0.0, sizes[1], stiff, poisson, self.moved, rigid, True)
+        upper.shift = upper.shift - upper.gradient @ self.apart
+        yield upper
+        if self.second:  # continuous with the body below
+            cap = self._body("cap", 1.0, 3, stiff, poisson, rest, False, not rigid)
+            at = self._up() + self.apart
+            cap.shift = upper.shift + (upper.gradient - cap.gradient) @ at
+            yield cap
 
     def _quadratic(self) -> bool:
         return not {self.row["slave cells"], self.row["master cells"]} & set(LINEAR)
@@ -178,34 +188,19 @@ class States:
             )
             strain = self._full(gradient) - self._strain(young, poisson, stress)
         else:
-            away = strain if row["also"] in ("strain", "temperature") else 0 * strain
             shear_now = self.shear if name != "cap" or row["master"] == "meshed" else 0.0
             a = (
                 -pressure * self.normal / (lame + 2 * shear)
                 + shear_now * pressure / shear * self.along
             )
             gradient = np.outer(a, self.normal)
-            if np.any(away):  # stress from free strain is taken off along the normal
-                free = self._stress(young, poisson, away)[: self.dim, : self.dim]
-                gradient += (
-                    np.outer(self.normal, self.normal)
-                    * (self.normal @ free @ self.normal)
-                    / (lame + 2 * shear)
-                )
+            # the strain is free along the normal
+            free = self._stress(young, poisson, strain)[: self.dim, : self.dim]
+            pressed = self.normal @ free @ self.normal
+            gradient += np.outer(self.normal, self.normal) * pressed / (lame + 2 * shear)
             stress = self._stress(young, poisson, self._full(gradient) - strain)
         if rigid:
             gradient = np.zeros_like(gradient)
-        shift = shift.copy()
-        if name == "upper" and row["gap"] == "meshed":
-            shift -= gradient @ (GAP * self.normal)
-        if name == "cap":  # continuous with the body below at z = 1
-            below, place = self._below, self._up()
-            if row["gap"] == "meshed":
-                place = place + GAP * self.normal
-            shift = below.shift + (below.gradient - gradient) @ place
-        found = Body(
+        return Body(
             name, cells, low, divisions, young, poisson, gradient, shift, strain, stress, rigid
         )
-        if name == "upper":
-            self._below = found
-        return found

@@ -1,6 +1,7 @@
 """The array is whole and a part of it exact; refusals name both keys, faults turn it red."""
 
 import random
+from itertools import product
 
 import pytest
 
@@ -8,8 +9,7 @@ from solver.system.errors import InputError
 from tests.pairs.array import missing, stored
 from tests.pairs.faults import FAULTS
 from tests.pairs.judge import tried
-from tests.pairs.options import EXCLUDED, OPTIONS, PLAIN, REFUSED, Rule, possible
-from tests.pairs.page import refusals
+from tests.pairs.options import EXCLUDED, OPTIONS, PLAIN, REFUSED, Rule, plain_in, possible
 from tests.pairs.problem import problem_of
 
 ROWS = stored()
@@ -38,23 +38,19 @@ def completed(part):
         part.get(k, "").startswith(("HEXA", "TETRA", "P")) for k in ("slave cells", "master cells")
     )
     solid &= part.get("space", "solid") == "solid"
-    cells = "HEXA8" if solid else "QUAD4"
-    row = {
-        **PLAIN,
-        "space": "solid" if solid else "strain",
-        "slave cells": cells,
-        "master cells": cells,
-    }
-    row |= part
+    row = plain_in("solid" if solid else "strain") | part
     for side, other in (("slave cells", "master cells"), ("master cells", "slave cells")):
         if side in part and other not in part:
             row[other] = part[side]
-    if any(rule.applies(row) for rule in EXCLUDED):
-        return None
-    return row
+    return None if any(rule.applies(row) for rule in EXCLUDED) else row
 
 
-REFUSALS = [(rule, row) for rule, part in refusals() if (row := completed(part))]
+REFUSALS = [
+    (rule, row)
+    for rule in REFUSED
+    for values in product(*rule.when.values())
+    if (row := completed(dict(zip(rule.when, values, strict=True))))
+]
 
 
 @pytest.mark.parametrize(
@@ -71,11 +67,7 @@ def test_what_does_not_go_together_is_refused_by_both_keys(rule, row):
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_where_options_meet_turns_the_array_red(fault, monkeypatch):
     """Each option alone stays exact: no test of one option notices."""
-    alone = {
-        **PLAIN,
-        "space": fault.space,
-        **dict.fromkeys(("slave cells", "master cells"), fault.cells),
-    }
+    alone = plain_in(fault.space)
     fault.plant(monkeypatch)
     for name, value in fault.options.items():
         single = {**alone, name: value}
@@ -91,13 +83,5 @@ def test_every_rule_of_the_program_is_tried():
 
 def test_the_program_refuses_a_case_file_before_it_is_meshed():
     with pytest.raises(InputError, match="must be lac in a zone with friction"):
-        problem_of(
-            {
-                **PLAIN,
-                "slave cells": "QUAD4",
-                "master cells": "QUAD4",
-                "friction": "stick",
-                "treatment": "nodal",
-            }
-        )
+        problem_of({**plain_in("strain"), "friction": "stick", "treatment": "nodal"})
     assert set(PLAIN) == set(OPTIONS)

@@ -19,8 +19,8 @@ import numpy as np
 # falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits.
 _MOST, _EXACT, _ENOUGH, _STALLED = 60, 1e-13, 1e-9, 0.3
 _LATE, _ROUNDED = 15, 1e-6
-# Up to this coefficient the first state found is taken for the only one.
-_UNIQUE = 1.0
+UNIQUE = 1.0
+"""Up to this coefficient the first state found is taken for the only one."""
 # A step of the line search is halved down to this.
 _SHORTEST = 1e-3
 
@@ -76,7 +76,7 @@ class CoulombContact:
         size = np.abs(forces).max(initial=0.0) or 1.0
         start, rest = forces / size, np.zeros(len(forces))
         found = [self._newton(rest, start, False)]
-        if self.friction.max(initial=0.0) > _UNIQUE:
+        if self.friction.max(initial=0.0) > UNIQUE:
             found.append(self._newton(self._sliding(start), start, False))
         if not any(found):
             found = [self._newton(rest, start, True)]

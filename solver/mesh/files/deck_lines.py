@@ -66,14 +66,14 @@ _FULL_CIRCLE = 360.0
 
 @dataclass(frozen=True)
 class _Placed:
-    """What stands in a row of a file."""
+    """A part of a deck: the file it is in, and the line it starts on."""
 
     file: Path
     row: int
 
     @property
     def where(self) -> str:
-        """For messages."""
+        """The file and line, for messages."""
         return f"{self.file}, line {self.row}"
 
 

@@ -230,14 +230,14 @@ def estimate(
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
-    # Of a stress, that of initial strain is taken off in double precision.
-    taken_off = float(np.abs(scene.initial.stress).max(initial=0.0))
-    mean_stress = max(scene.mean.cancellation(iterate.mean_stress)[1], taken_off)
+    # Taken off a stress in double precision, whatever the iterate's is.
+    of_strain = float(np.abs(scene.initial.stress).max(initial=0.0))
+    in_double = max(scene.mean.cancellation(iterate.mean_stress)[1], of_strain)
     errors = {
         "forces": pressure_of_forces(moving, noise),
         "gap": pressure_of_gaps(moving, rounded.gaps[closed], diagonal),
         "coordinates": tilted + rough.stress(scene.blocks, moved),
-        "stress": max(unit * iterate.sizes.highest, EPSILON * mean_stress),
+        "stress": max(unit * iterate.sizes.highest, EPSILON * in_double),
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }

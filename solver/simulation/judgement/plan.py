@@ -18,8 +18,6 @@ from ..results.solution import Line, Solution
 from ..scene.bodies import body_names, coincident
 from ..scene.scene import Scene, ZoneScene
 
-# Up to this coefficient of friction no other states are looked for.
-_UNIQUE = 1.0
 # An estimated error below this is rounding.
 _ROUNDING = 1e-10
 
@@ -115,7 +113,9 @@ def _friction(largest: float, states: Sequence[Equilibrium]) -> Iterator[Line]:
         return
     path = "one step from rest" if len(rates) == 1 else f"a path of {len(rates)} steps from rest"
     yield Line(f"friction: {path}", "the state depends on the order and the size of the steps")
-    if largest > _UNIQUE:
+    from ...mechanics.mortar.coulomb import UNIQUE  # friction alone
+
+    if largest > UNIQUE:
         what = f"friction: for a coefficient of {largest:g} other states may exist"
         yield Line(what, "of those found, most of the contact stays closed in this one")
     if max(rates) > 0:

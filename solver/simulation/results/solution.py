@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
     from ...case.model import Case
 
+# Normals that differ by less are those of a flat surface.
+_FLAT = 1e-9
+
 
 class Line(NamedTuple):
     """A line of the plan: what was left out or decided, and why.
@@ -147,6 +150,11 @@ class ZoneResult:
     recovered: RecoveredPressure | None = None
     resultants: Resultants | None = None
     friction: ZoneFriction | None = None
+
+    @property
+    def flat(self) -> bool:
+        """Whether all macro-elements have one normal, up to rounding."""
+        return bool((np.ptp(self.normal, axis=0) < _FLAT).all())
 
     @property
     def shown_status(self) -> np.ndarray:
