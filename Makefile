@@ -33,7 +33,7 @@ SETTINGS = $(strip $(CONFIG) $(if $(CASES),"cases=$(FROM)$(CASES)"))
 CHOICE = $(if $(FAMILY),"family='$(FAMILY)'") $(if $(CASE),"case='$(CASE)'") \
 	$(if $(FAILED),failed=true)
 SILENCE = $(if $(QUIET),--quiet rules progress reason host)
-SNAKEMAKE = $(ALONE) snakemake --cores $(CORES) $(SILENCE) $(ARGS) \
+SNAKEMAKE = .venv/bin/python -I workflow/start.py --cores $(CORES) $(SILENCE) $(ARGS) \
 	$(if $(SETTINGS),--config $(SETTINGS)) --
 
 # The last lines of a run say how many passed and where the report is, also where nothing was to be

@@ -156,6 +156,12 @@ class Case:
         )
         return replace(found, zones=zones, swapped=swapped, hexahedra=hexahedra, recovery=recovery)
 
+    def until(self, count: int) -> "Case":
+        """The case with its first `count` steps alone, for which it gives no reference."""
+        if count == len(self.steps):
+            return self
+        return replace(self, steps=self.steps[:count], reference={}, expected={}, solution=None)
+
     def zone_key(self, number: int, side: str) -> str:
         """The key of the file under which the group stands that is solved as slave or master."""
         if self.swapped:

@@ -18,8 +18,8 @@ Fault = tuple[str, object, str]
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
 # Those that need friction.
 _OF_FRICTION = {"friction_traction", "slip", "stick_area", "dissipation"}
-# Treatments with multipliers at nodes, and those with one on each face.
-_AT_NODES, _BY_FACE = ("node_to_segment", "nodal", "nodal_dual"), "lac, uncut, quadrature"
+# Treatments with fewer multipliers than nodes of the slave where two sides move as one.
+_CYCLIC = "lac", "quadrature"
 # Keys of the reference for values at probes.
 PROBED = ("displacement_at", "stress_at", "pressure_at")
 # The vectors of a selection.
@@ -94,11 +94,10 @@ def _in_zones(case: Case) -> Iterator[Fault]:
             allowed = "the name is given to two zones; each needs its own"
             yield f"contact[{i}].name", zone.name, allowed
         yield from _in_zone(f"contact[{i}]", zone)
-        if zone.treatment in _AT_NODES and any(support.cyclic for support in case.supports):
-            allowed = (
-                "with supports that are cyclic, two nodes that move as one have a multiplier each"
-            )
-            yield f"contact[{i}].treatment", zone.treatment, f"{allowed}; allowed: {_BY_FACE}"
+        cyclic = any(support.cyclic for support in case.supports)
+        if cyclic and zone.treatment not in _CYCLIC:
+            allowed = f"with supports that are cyclic must be one of {', '.join(_CYCLIC)}"
+            yield f"contact[{i}].treatment", zone.treatment, allowed
         names.add(zone.name)
     for i, item in enumerate(case.observe):
         if item.zone not in names:

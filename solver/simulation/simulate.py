@@ -44,6 +44,8 @@ def simulate(
     """
     started, clock = processor_time(), clock or Clock()
     solution = solve_problem(assembled(case, mesh, options, clock), clock)
+    if solution.ended:
+        raise SolveError(solution.ended)
     solution.cpu_seconds = processor_time() - started
     return solution
 
@@ -51,30 +53,24 @@ def simulate(
 def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     """Solve an assembled problem step by step, each from the status of the one before.
 
-    How it was assembled goes on record. Raises SolveError where no solution is found.
+    How it was assembled goes on record. Where a later step has no solution, those before it are
+    kept, and `ended` says why. Raises SolveError where the first step has none.
     """
     scene, case = problem.scene, problem.scene.case
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
-    states, fields = list[Equilibrium](), list[Recovered]()
+    states, fields, ended = list[Equilibrium](), list[Recovered](), ""
     with stage(clock, "solve"):
         for factor, step in zip(case.factors, case.steps, strict=True):
-            last = states[-1] if states else None
-            if case.frictional:
-                from .equilibrium.friction_recovery import solve_and_recover  # friction alone
-
-                try:
-                    state, field = solve_and_recover(problem, step, last)
-                except SolveError as error:
-                    raise SolveError(f"{_called(step, factor)}: {error}") from None
-            else:
-                before = case.steps[len(states) - 1] if states else None
-                state = problem.solve(step, last.status.closed if last else None, before=before)
-                if (state.trial.violation(state.iterate.closed) > 1).any():
-                    what = f"{_called(step, factor)}: contact bears tension or surfaces overlap"
-                    raise SolveError(what)
-                state, field = recovered(problem, state, step)
+            try:
+                state, field = _solved(problem, step, states)
+            except SolveError as error:
+                ended = f"{_called(step, factor)}: {error}" if len(case.steps) > 1 else str(error)
+                if not states:
+                    raise SolveError(ended) from None
+                problem.scene = replace(scene, case=case.until(len(states)))
+                break
             states.append(state)
             fields.append(field)
             closed = int(state.status.closed[: scene.n_multipliers].sum())
@@ -88,10 +84,27 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     _log_forces(solution)
     solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
     solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
+    solution.ended = ended
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
     solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
+
+
+def _solved(
+    problem: ContactProblem, step: Step, states: list[Equilibrium]
+) -> tuple[Equilibrium, Recovered]:
+    """A step after those solved, and its recovered pressure."""
+    case, last = problem.scene.case, states[-1] if states else None
+    if case.frictional:
+        from .equilibrium.friction_recovery import solve_and_recover  # friction alone
+
+        return solve_and_recover(problem, step, last)
+    before = case.steps[len(states) - 1] if states else None
+    state = problem.solve(step, last.status.closed if last else None, before=before)
+    if (state.trial.violation(state.iterate.closed) > 1).any():
+        raise SolveError("contact bears tension or surfaces overlap")
+    return recovered(problem, state, step)
 
 
 def assembled(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> ContactProblem:

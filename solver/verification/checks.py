@@ -33,7 +33,7 @@ from ..system.errors import InputError
 from ..system.files import write_text
 from . import numbers, samples
 from .inputs import accepted_file
-from .verdict import CheckResult, Regression
+from .verdict import CheckResult, Regression, extremes
 
 
 def unit(_: Solution) -> float:
@@ -254,7 +254,7 @@ def _rounded(value: float, scale: float) -> float:
 
 
 def _shown(accepted: Accepted | None) -> str:
-    return "none" if accepted is None else f"{accepted.minimum:.12g} … {accepted.maximum:.12g}"
+    return extremes(accepted.minimum, accepted.maximum) if accepted else "none"
 
 
 def _write(path: Path, values: Mapping[str, Accepted]) -> None:

@@ -84,7 +84,8 @@ def judge(
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
     relative error that rounding alone may cause, is the first reason), where the solve is beyond
-    what linear theory takes for granted, or where its mesh does not resolve the pressure. `result`
+    what linear theory takes for granted, or where its mesh does not resolve the pressure; `failed`
+    where a step has no solution. `result`
     is the name of the result file beside the verdict and `sha256` its hash.
     """
     accuracy, scatters = Accuracy(solution.accuracy), unresolved(solution)
@@ -94,6 +95,8 @@ def judge(
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
         word = UNRELIABLE if unreliable else FAILED
+    if solution.ended:
+        word, reasons = FAILED, [f"{solution.ended}; the steps before it are kept", *reasons]
     seconds, zones, case = solution.seconds, solution.zones, solution.case
     # In 3D, and on the full circle, forces are whole ones.
     spatial = solution.mesh.points.shape[1] == 3 or case.axisymmetric

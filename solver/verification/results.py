@@ -65,6 +65,7 @@ _SCALARS = (
     "matrix_entries",
     "cpu_seconds",
     "peak_memory_mb",
+    "ended",
 )
 _ON_FACES = {
     "pressure": "multiplier",
@@ -317,15 +318,15 @@ def _write_case(group: h5py.Group, solution: Solution) -> None:
         swapped=solution.swapped,
         hexahedra=solution.hexahedra or "",
         recovery=case.recovery or "",
+        steps=len(case.steps),
     )
 
 
 def _read_case(group: h5py.Group) -> Case:
     case = parse_case(group["source"].asstr()[()], Path(group.attrs["path"]))
     kept = group.attrs
-    return case.as_solved(
-        bool(kept["swapped"]), kept["hexahedra"] or None, kept["recovery"] or None
-    )
+    solved_as = bool(kept["swapped"]), kept["hexahedra"] or None, kept["recovery"] or None
+    return case.as_solved(*solved_as).until(int(kept["steps"]))
 
 
 def _write_bodies(group: h5py.Group, bodies: Sequence[BodyInfo]) -> None:

@@ -136,7 +136,7 @@ def solve(
         options = Options.everything() if job.everything else LEAN
         solution = solve_problem(assembled(case, mesh, options, clock), clock)
         with stage(clock, "checks"):  # accepted values belong to the case's own mesh
-            checks = checked(solution, job.refine == 1)
+            checks = checked(solution, job.refine == 1 and not solution.ended)
         solution.cpu_seconds = processor_time() - started
         provenance = gather(job.case, job.mesh or case.mesh.get("path")) | inputs
         if output:

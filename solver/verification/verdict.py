@@ -102,11 +102,16 @@ class CheckResult:
         if self.regression and not self.regression.passed:
             old = self.regression
             return (
-                f"{self.title}: {self.minimum:.12g} … {self.maximum:.12g}, accepted "
-                f"{old.minimum:.12g} … {old.maximum:.12g}: change {old.change:.2e}, tolerance "
+                f"{self.title}: {extremes(self.minimum, self.maximum)}, accepted "
+                f"{extremes(old.minimum, old.maximum)}: change {old.change:.2e}, tolerance "
                 f"{old.tolerance:.1e}"
             )
         return ""
+
+
+def extremes(least: float, most: float) -> str:
+    """Both, or the one number that both show as."""
+    return " … ".join(dict.fromkeys(f"{value:.12g}" for value in (least, most)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -104,8 +104,8 @@ REFUSED = (
         ("stabilised", "treatment"),
     ),
     Rule(
-        {"supports": ("cyclic",), "treatment": ("node_to_segment", *NODAL)},
-        "two multipliers of one node",
+        {"supports": ("cyclic",), "treatment": _not("treatment", "lac", "quadrature")},
+        "more multipliers than nodes that move",
         ("treatment", "cyclic"),
     ),
     *_of_slave(

@@ -14,6 +14,7 @@ from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
+from solver.verification.run import Job, check, solve
 from tests import scenes
 from tests.scenes import POISSON, YOUNG, block_mesh
 
@@ -31,6 +32,8 @@ loads:
 contact: [{name: zone, slave: bottom_contact, master: top_contact}]
 observe: [{zone: zone, nearest: [0, 0]}]
 """
+PARTS = """size: 1.0, bottom: {cells: QUAD4, divisions: [3, 3]}, top: {cells: QUAD8, \
+divisions: [2, 2]}"""
 
 
 def solved(text):
@@ -166,3 +169,19 @@ def test_places_are_observed_against_the_last_factor():
     found = {check.name: check for check in run_checks(solved(text)[0])}
     assert found["observation"].error < 1e-12
     assert found["observation"].maximum == pytest.approx(16.5)
+
+
+def test_the_steps_before_one_without_a_solution_are_kept(tmp_path):
+    """Friction alone holds the upper block along x; some of it slips, and then nothing presses."""
+    path = "steps: [{press: 1, weight: 1}, {press: 2, weight: 1}, {press: 0, weight: 0}]\n"
+    given = CASE.replace("  - {group: symx, fix: [x]}\n", "").replace("fix: [y]", "fix: [x, y]")
+    given = given.replace("_contact}]", "_contact, friction: 0.4}]").replace("[0, -8", "[9, -8")
+    case = tmp_path / "steps.yaml"
+    case.write_text(given.replace("size: 1.0", PARTS) + path)
+    verdict = solve(Job(case), tmp_path / "result.vtkhdf", tmp_path / "verdict.json")
+    assert (verdict.verdict, verdict.passed) == ("failed", False)
+    assert verdict.reason.startswith("step 3 (press 0, weight 0): nothing keeps top from a free")
+    again = read_result(tmp_path / "result.vtkhdf").solution
+    pressures = [step.resultants["zone"].force[1] for step in again.steps]
+    assert pressures == pytest.approx([-33, -58])
+    assert check(tmp_path / "result.vtkhdf").reason == verdict.reason

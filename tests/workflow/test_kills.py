@@ -7,10 +7,13 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 
+import pytest
+
 from tests.workflow.kills import SNAKEMAKE, kill_at_random
-from tests.workflow.projects import new_project
+from tests.workflow.projects import ROOT, new_project
 
 
 def test_what_is_killed_recovers(tmp_path):
@@ -40,3 +43,12 @@ def test_ctrl_c_leaves_no_verdict_and_nothing_runs_on(tmp_path):
     assert not list(log.parent.glob("*.vtkhdf*"))
     assert {verdict["verdict"] for verdict in verdicts} <= {"passed"}
     assert "crashed:" not in (tmp_path / "output").read_text()
+
+
+@pytest.mark.parametrize("after", [0.1, 0.3, 0.6])
+def test_ctrl_c_while_python_starts_prints_no_traceback(tmp_path, after):
+    start = [sys.executable, "-I", str(ROOT / "workflow" / "start.py"), "--version"]
+    with subprocess.Popen(start, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as run:
+        time.sleep(after)
+        run.send_signal(signal.SIGINT)
+        assert "Traceback" not in run.communicate()[1]

@@ -254,6 +254,7 @@ class Solution:
     nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
     `acted`: nodes by the key of the support, or of the load on a surface.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
+    `ended`: why the step after the last one has no solution; `case` then has the steps before.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
     `stage_cpu_seconds` are wall and processor time by stage, `peak_memory_mb` the process's largest
@@ -291,6 +292,7 @@ class Solution:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
+    ended: str = ""
 
     @property
     def swapped(self) -> bool:

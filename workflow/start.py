@@ -1,0 +1,10 @@
+"""Start Snakemake; an interrupt while it is not yet at work ends the run without a traceback."""
+
+import sys
+
+try:
+    from snakemake.cli import main
+
+    main()
+except KeyboardInterrupt:
+    sys.exit(130)
