@@ -3,7 +3,7 @@
 import sys
 
 try:
-    from snakemake.cli import main
+    from snakemake.cli import main  # type: ignore[import-untyped]
 
     main()
 except KeyboardInterrupt:

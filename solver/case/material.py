@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass, field, replace
 
+MIXED_ABOVE = 0.499
+"""Poisson's ratio above which the mixed form is taken where a case does not choose."""
+
 
 @dataclass(frozen=True)
 class Material:
@@ -16,6 +19,12 @@ class Material:
     poisson: float
     form: str = field(default="automatic", compare=False)
     thin: bool = False
+
+    @property
+    def mixed(self) -> bool:
+        """Whether its cells are solved in mixed form: as chosen, or above the bound."""
+        nearly = self.form == "automatic" and self.poisson > MIXED_ABOVE
+        return self.form == "mixed" or nearly
 
     def in_plane_stress(self) -> "Material":
         """E (1 + 2ν)/(1 + ν)² and ν/(1 + ν): E and E ν/(1 − ν²) stay as plane stress has them.

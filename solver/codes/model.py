@@ -175,7 +175,7 @@ class Model:
                 motion = np.zeros(self.scene.points.shape)
                 motion[mine, axis] = 1.0
                 left = motion.ravel() - basis @ (basis.T @ motion.ravel())
-                sprung = (self.scene.springs @ motion.ravel()).any()
+                sprung = (self.scene.resisting @ motion.ravel()).any()
                 if np.abs(left).max() < 1e-9 and not sprung:
                     force[axis] = sign * acting[mine, axis].sum()
         return force, scale

@@ -39,6 +39,7 @@ from ..mesh import generate, transform
 from ..simulation.equilibrium.problem import ContactProblem
 from ..simulation.equilibrium.state import Accuracy
 from ..simulation.options import Options, Safeguards
+from ..simulation.scene.parts.mixed import MixedForm
 from ..simulation.scene.scene import Scene, build_scene, carried_over
 from ..simulation.simulate import solve_problem
 from ..system.errors import InputError
@@ -164,18 +165,20 @@ def floor(
     points += carried_over(scene, mesh, misplaced(scene.case, raw, mesh))
     upper = upper_nodes(scene)
     exact = state.displacement(points, upper).ravel()
-    mean_stress = scene.mean.holding(state.volumetric[upper.astype(int)].astype(float))
+    means = [part.mean for part in scene.parts if isinstance(part, MixedForm)]
+    held = state.volumetric[upper.astype(int)].astype(float)
+    mixed = [(mean, mean.holding(held)) for mean in means]
     motions, fit = problem.at_rest.motions, problem.at_rest.fit
     amount = fit @ exact.astype(float)
     remainder = (exact - motions.astype(np.longdouble) @ amount).reshape(scene.points.shape)
     found = []
     for deformation in _roundings(remainder):
         internal = internal_force(scene.points, scene.blocks, deformation, extended=True)
-        internal += scene.mean.force(mean_stress)
+        internal += sum(mean.force(values) for mean, values in mixed)
         left = scene.free.basis.T @ (scene.force - internal).astype(float).ravel()
         pressure = system.multiplier(left)
         stress = nodal_stress(scene.points, scene.blocks, deformation, extended=True)
-        stress += scene.mean.nodal_stress(mean_stress, scene.blocks)
+        stress += sum(mean.nodal_stress(values, scene.blocks) for mean, values in mixed)
         error = float(np.abs(pressure / state.pressure - 1).max(initial=0.0))
         found.append((error, stress_error(stress, scene, state)))
     highest = np.max(found, axis=0)

@@ -59,7 +59,8 @@ def inf_sup_constant(scene: Scene) -> float:
     Raises SolveError where the system is singular.
     """
     basis = scene.free.basis
-    energy = stiffness(scene.points, scene.blocks) + scene.mean.stiffness()
+    energy = stiffness(scene.points, scene.blocks)
+    energy = sum((part.stiffness for part in scene.parts if part.stiffness is not None), energy)
     energy = energy + mass(scene.points, scene.blocks) / scene.length**2
     gaps = sparse.vstack([zone.operator.matrix for zone in scene.zones]) @ basis
     area = np.concatenate([zone.operator.area for zone in scene.zones])

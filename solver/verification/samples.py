@@ -28,8 +28,8 @@ from ..mechanics.fem.elasticity import (
 from ..mechanics.fem.stress import COMPONENTS
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
-from ..simulation.scene.attributes import strain_at
 from ..simulation.scene.groups import ALL
+from ..simulation.scene.parts.strain import strain_at
 from ..system.errors import InputError, hint
 from .coverage import expected_coverage
 

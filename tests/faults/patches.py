@@ -204,8 +204,8 @@ def more_covered(operator: Any) -> Any:
 def springs_counted(true: Wrapped) -> Wrapped:
     """The strain energy with that of springs."""
 
-    def energy(scene: Any, state: Any) -> float:
-        return float(true(scene, state) + (state.displacement * state.iterate.springs).sum() / 2)
+    def energy(state: Any) -> float:
+        return float(true(state) + (state.displacement * state.iterate.ground).sum() / 2)
 
     return energy
 

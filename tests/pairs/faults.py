@@ -9,7 +9,10 @@ import pytest
 
 from solver.mechanics.linear import systems
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation.scene import attributes, operators
+from solver.simulation.scene import operators
+from solver.simulation.scene.parts import strain
+from solver.simulation.scene.parts.springs import Springs
+from solver.simulation.scene.parts.strain import Strains
 from solver.simulation.scene.scene import Scene
 
 
@@ -49,17 +52,18 @@ def _turned_when_exchanged(true: Any) -> Any:
 def _springs_at_full_load(true: Any) -> Any:
     def acting(self: Scene, step: Any) -> Any:
         force, offset = true(self, step)
-        loose = self.springs.nnz and not isinstance(step, dict)
+        loose = any(isinstance(part, Springs) for part in self.parts)
+        loose = loose and not isinstance(step, dict)
         return (self.force if loose else force), offset
 
     return acting
 
 
 def _strain_without_name(true: Any) -> Any:
-    def straining(self: Scene, step: Any, values: np.ndarray) -> np.ndarray:
-        return true(self, 1.0 if isinstance(step, dict) else step, values)
+    def factors(self: Strains, step: Any) -> np.ndarray:
+        return true(self, 1.0 if isinstance(step, dict) else step)
 
-    return straining
+    return factors
 
 
 def _no_hoop_strain(true: Any) -> Any:
@@ -117,15 +121,15 @@ FAULTS = (
         "strain-without-name",
         "initial strain has no factor in a step of names",
         {"also": "strain", "steps": "path"},
-        Scene,
-        "straining",
+        Strains,
+        "factors",
         _strain_without_name,
     ),
     Fault(
         "hoop-strain",
         "initial strain has no part around the axis",
         {"space": "axisymmetric", "also": "strain"},
-        attributes,
+        strain,
         "strain_at",
         _no_hoop_strain,
     ),

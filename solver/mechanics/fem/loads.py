@@ -19,7 +19,6 @@ from ...lac.cells.shape import face_rule, invert, shape_functions
 from ...lac.errors import SolveError
 from .block import Block, volume_rule
 from .elasticity import chunks, shapes_in
-from .mixed import MeanStress
 from .stress import extrapolation, traction
 
 # A value of position: points (n, dim) to values (n,) or (n, dim).
@@ -159,18 +158,17 @@ _TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 class StrainLoads:
     """What k initial strains do, each by itself; all but the energy are linear in them.
 
-    `force` (k, n, dim) at nodes; `swelling` (k, size), the integrals of q tr ε₀; `stress`
-    (k, n, 6), C ε₀ at nodes as `nodal_stress` averages it; `energy` (k, k), ∫ ε₀:C:ε₀.
+    `force` (k, n, dim) at nodes; `stress` (k, n, 6), C ε₀ at nodes as `nodal_stress` averages it;
+    `energy` (k, k), ∫ ε₀:C:ε₀.
     """
 
     force: np.ndarray
-    swelling: np.ndarray
     stress: np.ndarray
     energy: np.ndarray
 
 
 def strain_loads(
-    points: np.ndarray, blocks: Sequence[Block], mean: MeanStress, strains: Strains, count: int
+    points: np.ndarray, blocks: Sequence[Block], strains: Strains, count: int
 ) -> StrainLoads:
     """The loads of `count` initial strains in blocks, those in mixed form with λ = 0.
 
@@ -179,7 +177,7 @@ def strain_loads(
     n, dim = points.shape
     force, stress = np.zeros((count, n, dim)), np.zeros((count, n, 6))
     energy, around = np.zeros((count, count)), np.zeros(n)
-    for block in blocks if count else ():
+    for block in blocks:
         reference, weights = block.rule
         fit = extrapolation(block.type, reference)
         for part in chunks(block, dim):
@@ -203,8 +201,7 @@ def strain_loads(
             energy += np.einsum("kcqs,lcqs->kl", weighted, strain, optimize=True)
         around += np.bincount(block.cells.ravel(), minlength=n)
     stress /= np.maximum(around, 1)[:, None]
-    swelling = mean.integrals(points, lambda block: strains(block)[..., :3].sum(axis=-1), count)
-    return StrainLoads(force=force, swelling=swelling, stress=stress, energy=energy)
+    return StrainLoads(force=force, stress=stress, energy=energy)
 
 
 def _stress(block: Block, strain: np.ndarray) -> np.ndarray:

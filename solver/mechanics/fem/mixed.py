@@ -31,8 +31,6 @@ from ...lac.cells.shape import shape_functions
 from .block import Block, degrees_of_freedom
 from .elasticity import chunks, shapes_in
 
-AUTOMATIC_ABOVE = 0.499
-"""Poisson's ratio above which the mixed form is taken where a case does not choose."""
 _CELLS_AT_ONCE = 2048
 
 
@@ -94,8 +92,6 @@ class MeanStress:
 
     def cancellation(self, stress: np.ndarray) -> tuple[np.ndarray, float]:
         """As `stress.sizes`: the sizes of what `force` sums (n_nodes,), and of s."""
-        if not self.size:
-            return np.zeros(self._shape[0]), 0.0
         size = np.abs(stress)
         sizes = (abs(self.divergence).T @ size).reshape(self._shape)
         return np.linalg.norm(sizes, axis=1), float(size.max(initial=0.0))
@@ -118,7 +114,7 @@ class MeanStress:
     ) -> np.ndarray:
         """∫ q v (count, size) of `values` (count, n, q) at the quadrature points of a block."""
         found = np.zeros((count, self.size))
-        for part in self._parts if count else ():
+        for part in self._parts:
             for some in chunks(part.block, self._shape[1]):
                 block = part.block.of(some)
                 reference, weights = block.rule
@@ -189,11 +185,6 @@ class MeanStress:
         return total
 
 
-def in_mixed_form(poisson: float, form: str) -> bool:
-    """Whether a material of that Poisson's ratio is solved in mixed form: as chosen, or above."""
-    return form == "mixed" or (form == "automatic" and poisson > AUTOMATIC_ABOVE)
-
-
 def split(
     points: np.ndarray,
     blocks: Sequence[Block],
@@ -216,7 +207,8 @@ def split(
             whole.append(block.of(~chosen))
         part = block.of(chosen)
         whole.append(replace(part, lame=np.zeros(len(part.cells))))
-        parts.append((part, np.flatnonzero(chosen), number[chosen]))
+        rows = np.arange(len(chosen)) if block.rows is None else block.rows
+        parts.append((part, rows[chosen], number[chosen]))
     return whole, _mean_stress(points, parts)
 
 

@@ -322,8 +322,8 @@ def against_multigrid(size: int, unknowns: Unknowns) -> str:
         return "" if wanted() == MULTIGRID else _ASKED
     if unknowns.dim == 2:
         return "a factor is small in 2D"
-    if unknowns.mixed:
-        return "nearly incompressible cells: multigrid does not converge"
+    if unknowns.factored:
+        return unknowns.factored
     few = size < MULTIGRID_FROM
     return f"fewer than {MULTIGRID_FROM} unknowns: a factor is faster than multigrid" * few
 

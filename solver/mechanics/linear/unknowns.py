@@ -27,7 +27,7 @@ class Unknowns:
     motions (n, 3 or 6) in these unknowns, which nobody keeps; `body` (n,): the number of the body.
     Bodies that slide on each other share no aggregate. `points` (n_nodes, 3): coordinates of the
     nodes. Where cells are quadratic, `linear` (n, m) interpolates from the unknowns `vertices` (m,)
-    of linear cells. `mixed`: some cells are in mixed form.
+    of linear cells. `factored`: why multigrid does not serve, if anything says so.
     """
 
     dim: int
@@ -37,7 +37,7 @@ class Unknowns:
     points: np.ndarray | None = None
     vertices: np.ndarray | None = None
     linear: csr_matrix | None = None
-    mixed: bool = False
+    factored: str = ""
 
     @property
     def quadratic(self) -> bool:
@@ -52,10 +52,10 @@ class Unknowns:
 
         arrays = self.node[chosen], motions, self.body[chosen], self.points
         if self.linear is None or self.vertices is None:
-            return Unknowns(self.dim, *arrays, mixed=self.mixed)
+            return Unknowns(self.dim, *arrays, factored=self.factored)
         mine = np.flatnonzero(np.isin(self.vertices, chosen))
         vertices = np.searchsorted(chosen, self.vertices[mine])
-        return Unknowns(self.dim, *arrays, vertices, self.linear[chosen][:, mine], self.mixed)
+        return Unknowns(self.dim, *arrays, vertices, self.linear[chosen][:, mine], self.factored)
 
     def of_vertices(self) -> "Unknowns":
         """Those of linear cells on the same vertices."""

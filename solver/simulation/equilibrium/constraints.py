@@ -22,7 +22,6 @@ from ...mechanics.linear.symmetric_blocks import NodalMatrix, Stiffness
 from ...mechanics.linear.unknowns import Unknowns, from_vertices, linear_unknowns
 from ...system.errors import InputError
 from ..scene.bodies import body_names
-from ..scene.cut_groups import unit_springs
 from ..scene.scene import Scene, ZoneScene
 
 # A macro-element covered by less than this share of its area is out of contact.
@@ -130,14 +129,14 @@ def _slave_dofs(scene: Scene) -> np.ndarray:
 class RigidMotions:
     """The r rigid motions of all bodies, by what resists them.
 
-    `supports` (r, r): see `support_resistance`; `springs` (s, r) and `opened` (k, r): what each
-    motion changes in the rows of `unit_springs`, and the average gap that it opens; `smooth` (k, r)
+    `supports` (r, r): see `support_resistance`; `resisting` (s, r) and `opened` (k, r): what each
+    motion changes in those rows of the scene, and the average gap that it opens; `smooth` (k, r)
     the same along smooth normals, where these differ. The motions themselves take as much memory as
     several displacements.
     """
 
     supports: np.ndarray
-    springs: sparse.csr_matrix
+    resisting: sparse.csr_matrix
     opened: sparse.csr_matrix
     smooth: sparse.csr_matrix | None
 
@@ -153,7 +152,7 @@ class RigidMotions:
         smooth = _smooth_gaps(scene)
         return cls(
             supports,
-            unit_springs(scene.springs) @ motions,
+            scene.resisting @ motions,
             (per_area @ constraints.gaps).tocsr() @ motions,
             None if smooth is None else (per_area @ smooth).tocsr() @ motions,
         )
@@ -176,7 +175,7 @@ def _smooth_gaps(scene: Scene) -> sparse.csr_matrix | None:
 def free_motion(scene: Scene, motions: RigidMotions, closed: np.ndarray) -> str:
     """The free motion with `closed` (k,) multipliers, in words; empty if nothing is free."""
     held, smooth = (
-        None if rows is None else sparse.vstack([rows[closed], motions.springs]).tocsr()
+        None if rows is None else sparse.vstack([rows[closed], motions.resisting]).tocsr()
         for rows in (motions.opened, motions.smooth)
     )
     found = unheld_motion(motions.supports, held, scene.n_bodies, smooth)
@@ -333,21 +332,19 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
 
     `single`: in single precision where multigrid solves.
     """
-    free, mean = scene.free, scene.mean
+    free, added = scene.free, [part for part in scene.parts if part.stiffness is not None]
     # Friction adds springs to the matrix.
     iterative = not (scene.case.frictional or against_multigrid(len(unknowns.node), unknowns))
-    plain = free.selection is not None and not scene.springs.nnz
-    in_blocks = plain and iterative and not mean.size and scene.points.shape[1] == 3
+    plain = free.selection is not None and not added
+    in_blocks = plain and iterative and scene.points.shape[1] == 3
     blocks = stiffness(scene.points, scene.blocks, single and in_blocks)
     diagonal = blocks.diagonal().astype(float)
     if in_blocks and free.selection is not None:
         return NodalMatrix(blocks, free.selection), diagonal
     matrix = free.reduced(blocks)
-    if scene.springs.nnz:
-        matrix = matrix + free.reduced(scene.springs)
-        diagonal = diagonal + scene.springs.diagonal()
-    if mean.size:
-        matrix = matrix + free.reduced(mean.stiffness())
+    for part in added:
+        matrix = matrix + free.reduced(part.stiffness)
+        diagonal = diagonal + part.diagonal
     return matrix, diagonal
 
 
@@ -363,8 +360,9 @@ def free_unknowns(scene: Scene) -> Unknowns:
             found[:, number] = scene.free.gathered(field.ravel())
         return found
 
-    about, mixed = (dim, node, motions, scene.body[node], scene.points), scene.mean.size > 0
+    factored = next((part.factored for part in scene.parts if part.factored), "")
+    about = dim, node, motions, scene.body[node], scene.points
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
-        return Unknowns(*about, mixed=mixed)
+        return Unknowns(*about, factored=factored)
     vertices = from_vertices(scene.points, scene.blocks)
-    return Unknowns(*about, *linear_unknowns(basis, dim, *vertices), mixed)
+    return Unknowns(*about, *linear_unknowns(basis, dim, *vertices), factored)

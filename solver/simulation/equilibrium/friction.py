@@ -28,6 +28,7 @@ from ...lac.friction import (
 )
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
+from ..scene.parts.springs import Springs
 from .problem import ContactProblem
 from .state import Equilibrium, Friction
 
@@ -158,7 +159,8 @@ class Search:
         across, stiff = slip.across
         along = sum(sparse.diags(across[:, c]) @ gaps[rows] for c, rows in enumerate(self.rows))
         weight = stiff / self.area
-        self.problem.hold_across((along.T @ sparse.diags(weight) @ along).tocsr())
+        springs = (along.T @ sparse.diags(weight) @ along).tocsr()
+        self.problem.hold_across(Springs(springs, self.problem.scene.points.shape))
         at_rest = self.area * (across * self.jump[self.rows].T).sum(axis=1)
         return across, stiff, along.T @ (weight * at_rest)
 
@@ -229,6 +231,8 @@ class Search:
     ) -> Equilibrium:
         """The state with its tractions among the pressures, and the history for the next step."""
         self.problem.hold_across(None)
+        scene = self.problem.scene
+        own = found.iterate.inner[: len(scene.parts)]  # without that of the springs across
         pressure, gap = found.pressure.copy(), found.gap.copy()
         limits = [found.trial.pressure_limit.copy(), found.trial.gap_limit.copy()]
         pressure[self.rows], gap[self.rows] = response.traction.T, response.slip.T
@@ -241,7 +245,7 @@ class Search:
         slipping[self.gaps] = status.slip.slips
         return replace(
             found,
-            iterate=replace(found.iterate, scene=self.problem.scene).under(
+            iterate=replace(found.iterate, scene=scene, inner=own).under(
                 found.iterate.force - force
             ),
             trial=replace(

@@ -6,17 +6,17 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import sparse
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.motions import rigid_motions, unsupported
 from ...lac.status import StatusResult, Trial, find_status
+from ...mechanics.fem.displacement import Displacement
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.symmetric_blocks import Stiffness
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
-from ..scene.cut_groups import unit_springs
+from ..scene.parts.part import Part
 from ..scene.scene import Scene
 from .constraints import (
     RigidMotions,
@@ -28,7 +28,7 @@ from .constraints import (
     moved,
     refuse_unsolvable,
 )
-from .iterate import ContactIterate, Displacement
+from .iterate import ContactIterate
 from .stabilised import compliance_of
 from .state import Equilibrium, estimate, judged, roughness, rounding
 
@@ -74,9 +74,8 @@ class ContactProblem:
         loose = unsupported(motions, self._motions.supports)
         self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
         self.unsupported = loose
-        if scene.springs.nnz:
-            springs = unit_springs(scene.springs)
-            self.unsupported = unsupported(motions, self._motions.supports, springs)
+        if (resisting := scene.resisting).shape[0]:
+            self.unsupported = unsupported(motions, self._motions.supports, resisting)
         refined = scene.options.safeguards.refinement
         # Springs of friction are added to a matrix in double precision.
         large = scene.n_dofs >= SINGLE_FROM and not scene.case.frictional
@@ -206,18 +205,18 @@ class ContactProblem:
         initial = np.where(constraints.normal, constraints.initial, -jump * constraints.covered)
         self.constraints = replace(constraints, initial=initial)
 
-    def hold_across(self, springs: sparse.csr_matrix | None) -> None:
-        """Add springs (n_dofs, n_dofs) to those of the scene, in place of any added before."""
-        if springs is None and self._without is None:
+    def hold_across(self, part: Part | None) -> None:
+        """Add a part to those of the scene, in place of any added before."""
+        if part is None and self._without is None:
             return
         if self._without is None:
             self._without = self.scene, self.matrix, self._systems
         self.scene, self.matrix, self._systems = self._without
-        if springs is None:
+        if part is None:
             self._without = None
             return
-        self.scene = replace(self.scene, springs=self.scene.springs + springs)
-        self.matrix = self.matrix + self.scene.free.reduced(springs)
+        self.scene = replace(self.scene, parts=(*self.scene.parts, part))
+        self.matrix = self.matrix + self.scene.free.reduced(part.stiffness)
         self._systems = self._systems_of(self.matrix)
 
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
@@ -270,8 +269,7 @@ class ContactProblem:
             closed=closed,
             force=acting + correction,
             displacement=self.at_rest.moved(offset),
-            mean_stress=np.zeros(scene.mean.size),
-            swelling=scene.straining(step, scene.initial.swelling),
+            inner=tuple(part.start(step) for part in scene.parts),
         )
 
     def _loose(self, closed: np.ndarray) -> str:
@@ -366,9 +364,8 @@ class ContactProblem:
 
         eligible = self.constraints.closable
         push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
-        # Up to round-off initial strain has no resultant.
-        strained = self.scene.straining(step, self.scene.initial.force)
-        loads = self.unsupported.T @ (self.scene.acting(step)[0] - strained).ravel()
+        # Up to round-off the loads of parts, such as initial strain, have no resultant.
+        loads = self.unsupported.T @ self.scene.given_loads(step)[0].ravel()
         largest = np.abs(loads).max(initial=0.0)
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
@@ -394,5 +391,5 @@ class ContactProblem:
 
 def _force_scale(start: ContactIterate) -> float:
     """The size of the forces at work: the loads, or those that imposed values bring up."""
-    internal = start.internal - start.springs
-    return float(max(np.abs(start.force).max(), np.abs(internal).max())) or 1.0
+    inside = start.internal - start.ground
+    return float(max(np.abs(start.force).max(), np.abs(inside).max())) or 1.0

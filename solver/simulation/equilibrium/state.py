@@ -192,10 +192,10 @@ class Rounding:
 def rounding(iterate: ContactIterate) -> Rounding:
     """The errors by rounding in an iterate."""
     scene, constraints = iterate.scene, iterate.constraints
-    mean_terms, _ = scene.mean.cancellation(iterate.mean_stress)
+    terms = sum(term.rounded[0] for term in iterate.terms)
     known = scene.rounding * constraints.covered * (constraints.initial != 0)
     return Rounding(
-        forces=_unit(iterate) * iterate.sizes.forces + EPSILON * mean_terms,
+        forces=_unit(iterate) * iterate.sizes.forces + EPSILON * terms,
         gaps=known + EPSILON * iterate.opening_size,
     )
 
@@ -231,8 +231,7 @@ def estimate(
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
     # Taken off a stress in double precision, whatever the iterate's is.
-    of_strain = float(np.abs(scene.initial.stress).max(initial=0.0))
-    in_double = max(scene.mean.cancellation(iterate.mean_stress)[1], of_strain)
+    in_double = max((term.rounded[1] for term in iterate.terms), default=0.0)
     errors = {
         "forces": pressure_of_forces(moving, noise),
         "gap": pressure_of_gaps(moving, rounded.gaps[closed], diagonal),

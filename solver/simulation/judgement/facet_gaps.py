@@ -60,7 +60,7 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
     pushed = np.maximum(state.pressure, 0.0) * problem.constraints.covered
     force = float(pushed[: scene.n_multipliers].sum())
-    closing = 2 * strain_energy(scene, state) / force if force > 0 else 0.0
+    closing = 2 * strain_energy(state) / force if force > 0 else 0.0
     for zone in scene.zones:
         mine, missed = zone.numbers, _missed(scene, zone)
         if missed is None:

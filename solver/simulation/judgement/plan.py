@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...lac.cut import needs_cut
-from ...mechanics.fem.mixed import AUTOMATIC_ABOVE
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
@@ -32,9 +31,7 @@ def decided(problem: ContactProblem) -> Iterator[Line]:
         many = "s" * (groups != 1)
         what = f"left behind: {groups} group{many}, {cells} faces and edges of the mesh"
         yield Line(what, "the case does not name them")
-    if scene.mean.n_cells:
-        why = f"nearly incompressible (Poisson's ratio above {AUTOMATIC_ABOVE:g}), or as chosen"
-        yield Line(f"mixed form in {scene.mean.n_cells} cells", why)
+    yield from (Line(*part.note) for part in scene.parts if part.note)
     for (a, b), count in coincident(scene).items():
         names = body_names(scene)
         what = f"{count} nodes of {names[a]} and {names[b]} at the same places, and no zone there"

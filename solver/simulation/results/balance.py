@@ -47,7 +47,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         result |= _both(f"zone {name}", points, forces, own, scale, scene.length, around)
     couple = sum((each for _, each in by_zone.values()), np.zeros(3))
     held, free_part = _unbalanced(scene, state, contact)
-    whole = held + state.force + _of_springs(state)
+    whole = held + state.force + _of_ground(state)
     result |= _both("reactions and loads", points, whole, -couple, scale, scene.length, around)
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
@@ -87,8 +87,9 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
         if any(getattr(support, name) for support in scene.case.supports):
             found[name] = found.get(name, 0.0) + left
             break  # what both of them hold is not distinguished
-    if state.iterate.springs.any():
-        found["springs"] = found.get("springs", 0.0) + _of_springs(state)
+    for part, term in zip(state.iterate.scene.parts, state.iterate.terms, strict=True):
+        if np.any(term.ground):
+            found[part.holder] = found.get(part.holder, 0.0) - term.ground
     at_nodes = sum(found.values(), np.zeros_like(left))
     return [_resultant(scene, name, force) for name, force in found.items()], at_nodes
 
@@ -122,9 +123,9 @@ def rigid_bodies(scene: Scene, state: Equilibrium) -> list[RigidMotion]:
     return found
 
 
-def _of_springs(state: Equilibrium) -> np.ndarray:
-    """The forces (n, dim) of springs on the bodies."""
-    return -state.iterate.springs
+def _of_ground(state: Equilibrium) -> np.ndarray:
+    """The forces (n, dim) on the bodies of parts that stand on the ground."""
+    return -state.iterate.ground
 
 
 def _holder(scene: Scene, key: str) -> str:
@@ -155,17 +156,14 @@ def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.array([0.0, 0.0, turning])
 
 
-def strain_energy(scene: Scene, state: Equilibrium) -> float:
+def strain_energy(state: Equilibrium) -> float:
     """½ ∫ σ:(ε − ε₀) of the bodies in the last step, by the work of forces.
 
     Rigid motions add none.
     """
-    iterate, initial = state.iterate, scene.initial
-    moved, step = iterate.deformation.sum(axis=0), scene.case.steps[-1]
-    elastic = (iterate.internal - iterate.springs) / 2 - scene.straining(step, initial.force)
-    of_strains = scene.straining(step, scene.straining(step, initial.energy))
-    swelled = iterate.mean_stress @ iterate.swelling
-    return float((moved * elastic).sum() + (of_strains - swelled) / 2)
+    iterate = state.iterate
+    work = iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
+    return float(work.sum() / 2 + sum(term.energy for term in iterate.terms))
 
 
 def _both(

@@ -54,8 +54,10 @@ def solution_of(
     stress = nodal_stress(
         scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
     )
-    stress += scene.mean.nodal_stress(last.iterate.mean_stress, scene.blocks)
-    stress -= scene.straining(scene.case.steps[-1], scene.initial.stress)
+    mean_stress: dict[str, np.ndarray] = {}
+    for term in last.iterate.terms:
+        stress += term.stress(scene.blocks)
+        mean_stress |= term.by_cell(scene.mesh.cells)
     if scene.case.thin:
         stress[:, 2] = 0.0
     scale = stress_scale(scene, states, stress)
@@ -84,12 +86,12 @@ def solution_of(
         linear_iterations=problem.linear_iterations,
         matrix_entries=problem.matrix.nnz,
         plan=plan,
-        strain_energy=strain_energy(scene, last),
+        strain_energy=strain_energy(last),
         reaction=at_nodes,
         probes=probed(scene, zones, last.displacement, stress),
         acted=scene.acted,
         accuracy=last.accuracy.causes,
-        mean_stress=scene.mean.by_cell(last.iterate.mean_stress, scene.mesh.cells),
+        mean_stress=mean_stress,
     )
 
 

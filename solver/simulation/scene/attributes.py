@@ -8,26 +8,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ...case.acting import Load, Step
-from ...case.expressions import Exact, evaluate
+from ...case.acting import Load
+from ...case.expressions import Exact
 from ...case.material import Material
-from ...case.model import Case
 from ...case.solutions.base import ExactSolution
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import FaceBlock, nodal_normals
-from ...lac.cells.shape import has_straight_edges, shape_functions
+from ...lac.cells.shape import has_straight_edges
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.elasticity import lame_parameters
-from ...mechanics.fem.faces import volume_cells
-from ...mechanics.fem.loads import (
-    StrainLoads,
-    body_forces,
-    face_forces,
-    strain_loads,
-    stress_forces,
-)
-from ...mechanics.fem.mixed import MeanStress, in_mixed_form, split
-from ...mechanics.fem.stress import COMPONENTS
+from ...mechanics.fem.loads import body_forces, face_forces, stress_forces
 from ...mechanics.fem.supports import (
     CopyError,
     Fixed,
@@ -66,18 +56,14 @@ class Attributes(CutGroups):
         for number in np.unique(part).tolist():
             yield number, nodes[part == number]
 
-    def elasticity(
-        self, mixed_form: bool = True, plain: bool = True
-    ) -> tuple[list[Block], MeanStress]:
-        """Cells with their materials, and the mean stress of those in mixed form.
+    def elasticity(self, plain: bool = True) -> list[Block]:
+        """Cells with their materials.
 
         Cells of rigid bodies, which need no material, get a unit one; they are left out where the
-        body moves. Without `mixed_form` none is in it, whatever the case says; `plain`: cells with
-        straight edges have plain quadrature.
+        body moves. `plain`: cells with straight edges have plain quadrature.
         """
         young = self.by_material(lambda m: m.young, 1.0)
         poisson = self.by_material(lambda m: m.poisson, 0.0)
-        mixed = self.by_material(lambda m: in_mixed_form(m.poisson, m.form), 0.0)
         moving = rigid.moving_nodes(self, self.frames)
         blocks = [
             Block(
@@ -90,22 +76,9 @@ class Attributes(CutGroups):
             )
             for name, cells in self.cut.cells.items()
         ]
-        meshed, number = {}, 0
-        for name, cells in volume_cells(self.mesh).items():
-            meshed[name] = number + np.arange(len(cells))
-            number += len(cells)
-        blocks, mean = split(
-            self.points,
-            blocks,
-            [
-                (mixed[name] > 0) & mixed_form & ~moving[cells].all(axis=1)
-                for name, cells in self.cut.cells.items()
-            ],
-            [self.cut.members(name, meshed) for name in self.cut.cells],
-        )
         if moving.any():
             blocks = [block.of(~moving[block.cells].all(axis=1)) for block in blocks]
-        return [block for block in blocks if len(block.cells)], mean
+        return [block for block in blocks if len(block.cells)]
 
     def by_material(
         self, value: Callable[[Material], float], otherwise: float
@@ -282,45 +255,3 @@ class Attributes(CutGroups):
         return stress_forces(
             *at, lambda x: exact.stress(x + origin, part), pressure, self.axisymmetric
         )
-
-
-def strain_factors(case: Case, step: Step) -> np.ndarray:
-    """The factors (k,) of the initial strains of a case in a step."""
-    return np.array([load.factor(step) for load in case.loads if load.strains])
-
-
-def strain_at(case: Case, load: Load, place: np.ndarray) -> np.ndarray:
-    """The initial strain (n, 6) of a load at points (n, dim).
-
-    In plane stress the strain across the plane is free and counts for nothing.
-    """
-    assert isinstance(load.value, dict)
-    found = np.zeros((len(place), 6))
-    if load.kind == "temperature":
-        parts = [evaluate(value, place) for value in load.value.values()]
-        found[:, :3] = np.prod(parts, axis=0)[:, None]
-    else:
-        for name, value in load.value.items():
-            found[:, COMPONENTS.index(name)] = evaluate(value, place)
-    if case.thin:
-        found[:, 2] = 0.0
-    return found
-
-
-def strain_loads_of(groups: Attributes, blocks: Sequence[Block], mean: MeanStress) -> StrainLoads:
-    """What the initial strains of a case do in its cells; arrays of length 0 where it has none."""
-    loads = [load for load in groups.case.loads if load.strains]
-    masks = [groups.cell_mask(load.group) if load.group != ALL else None for load in loads]
-
-    def strains(block: Block) -> np.ndarray:
-        values = shape_functions(block.type.name).values(block.rule[0])
-        place = values @ groups.points[block.cells] + groups.origin
-        found = np.zeros((len(loads), *place.shape[:2], 6))
-        for one, load, mask in zip(found, loads, masks, strict=True):
-            assert block.rows is not None
-            here = slice(None) if mask is None else mask[block.type.name][block.rows]
-            flat = place[here].reshape(-1, place.shape[2])
-            one[here] = strain_at(groups.case, load, flat).reshape(-1, place.shape[1], 6)
-        return found
-
-    return strain_loads(groups.points, blocks, mean, strains, len(loads))

@@ -21,7 +21,6 @@ from ...lac.motions import rigid_motions, support_resistance, unheld_motion
 from ...mechanics.fem.bodies import joined_bodies, nodes_of_unknowns
 from ...mechanics.fem.supports import FreeMotion
 from ...system.errors import InputError
-from .cut_groups import unit_springs
 from .scene import Scene, Unloaded, ZoneScene
 
 
@@ -173,8 +172,8 @@ def _unloaded(
     awake, imposed = np.zeros((2, n_bodies), dtype=bool)
     imposed[scene.body[(offset.reshape(scene.force.shape) != 0).any(axis=1)]] = True
     awake[scene.body[(scene.force != 0).any(axis=1)]] = True
-    # Where all of a body is held, its initial strain is stress.
-    imposed[scene.body[scene.initial.stress.any(axis=(0, 2))]] = True
+    for part in scene.parts:
+        imposed[scene.body[part.loaded]] = True
     awake |= imposed
     initial = np.concatenate([np.empty(0), *(zone.operator.initial for zone in scene.zones)])
     pushed = np.flatnonzero((initial < 0) | (gaps @ offset != 0))
@@ -190,7 +189,7 @@ def _moves_freely(scene: Scene, gaps: sparse.csr_matrix) -> bool:
     there = covered > 0
     per_area = sparse.diags(1 / covered[there]) @ gaps[there]
     motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
-    opened = sparse.vstack([per_area, unit_springs(scene.springs)]).tocsr() @ motions
+    opened = sparse.vstack([per_area, scene.resisting]).tocsr() @ motions
     supports = support_resistance(motions, scene.free.basis)
     return unheld_motion(supports, opened, scene.n_bodies) is not None
 

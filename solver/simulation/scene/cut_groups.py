@@ -12,7 +12,6 @@ from typing import TypeAlias
 
 import meshio
 import numpy as np
-from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ...case.acting import Scalar
@@ -25,7 +24,7 @@ from ...lac.cut import CutMesh, SubFaces
 from ...lac.facets import facets
 from ...lac.motions import body_numbers
 from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
-from ...mechanics.fem.loads import Field, at_nodes, foundation
+from ...mechanics.fem.loads import Field
 from ...mechanics.fem.supports import Copies
 from ...mechanics.mortar.treatments import TREATMENTS
 from ...mesh.transforms import rotation
@@ -262,56 +261,6 @@ def copies_of(groups: CutGroups) -> dict[str, Copies]:
             raise InputError(groups.case.path, key, support.group, allowed)
         found[key] = Copies(of, copy[nearest], turn)
     return found
-
-
-def springs_of(groups: CutGroups) -> sparse.csr_matrix:
-    """The stiffness (n_dofs, n_dofs) of springs and foundations."""
-    total = sparse.csr_matrix((groups.points.size, groups.points.size))
-    for i, support in enumerate(groups.case.supports):
-        for direction, value in support.spring.items():
-            total = total + _spring(
-                groups, support.group, direction, value, f"supports[{i}].spring.{direction}"
-            )
-    return total
-
-
-def _spring(
-    groups: CutGroups, group: str, direction: str, value: Scalar, key: str
-) -> sparse.csr_matrix:
-    points, axis, stiffness = groups.points, "xyz".find(direction), _stiffness(groups, value, key)
-    if group == ALL or group in groups.mesh.point_sets:
-        nodes = groups.nodes(group, key)
-        return at_nodes(points, nodes, stiffness(points[nodes]), axis)
-    along = None if axis < 0 else np.eye(points.shape[1])[axis]
-    return sum(
-        foundation(points, nodes, name, stiffness, along, groups.axisymmetric)
-        for name, nodes in groups.faces(group, key)
-    )
-
-
-def _stiffness(groups: CutGroups, value: Scalar, key: str) -> Field:
-    """A stiffness as a field; refused where it is not positive."""
-    field = groups.field(value)
-
-    def stiffness(local: np.ndarray) -> np.ndarray:
-        found = field(local)
-        if (found <= 0).any():
-            allowed = "a stiffness must be positive everywhere on the group"
-            raise InputError(groups.case.path, key, float(found.min()), allowed)
-        return found
-
-    return stiffness
-
-
-def unit_springs(springs: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The rows (k, n_dofs) of a stiffness of springs, the largest entry of each one.
-
-    They resist the same motions, soft springs beside stiff ones too. None where there are none.
-    """
-    if not springs.nnz:
-        return springs[:0]
-    largest = abs(springs).max(axis=1).toarray().ravel()
-    return (sparse.diags_array(1 / np.where(largest > 0, largest, 1.0)) @ springs).tocsr()
 
 
 def refuse_bent(case: Case, points: np.ndarray, surfaces: Surfaces) -> None:

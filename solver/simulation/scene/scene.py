@@ -18,16 +18,16 @@ from ...lac.operator import GapOperator
 from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.faces import volume_cells
-from ...mechanics.fem.loads import StrainLoads
-from ...mechanics.fem.mixed import MeanStress
 from ...mechanics.fem.supports import Fixed, FreeMotion
 from ...mechanics.mortar.treatments import TREATMENTS, Treatment, merge_fixed_multipliers
 from ...system.progress import Clock, stage
 from ..options import LEAN, Options
-from .attributes import Attributes, strain_factors, strain_loads_of
-from .cut_groups import CutZone, Surfaces, refuse_bent, springs_of, surfaces_of
+from .attributes import Attributes
+from .cut_groups import CutZone, Surfaces, refuse_bent, surfaces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of, with_contact_frames
+from .parts import parts_of
+from .parts.part import Part
 from .rigid import Frame
 from .selections import with_groups
 
@@ -132,11 +132,11 @@ class Scene:
     `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
-    cut, `body` (n,) the body of each node. `blocks` of cells in mixed form have λ = 0; `mean` makes
-    up for it. `fixed`: the displacements that are held, by key of the case file, `rigid`: the rigid
-    bodies. `springs` (n_dofs, n_dofs) is the stiffness of springs to the ground. `probed`: nodes by
-    probe; `acted`: nodes by the key of the support, or of the load on a surface. `force` (n, dim),
-    all but that of `initial` strains, and `free.offset` are for load factor 1.
+    cut, `body` (n,) the body of each node. `blocks` are the elastic cells, `parts` what there is
+    beside them. `fixed`: the displacements that are held, by key of the case file, `rigid`: the
+    rigid bodies. `probed`: nodes by probe; `acted`: nodes by the key of the support, or of the load
+    on a surface. `force` (n, dim), all but that of `parts`, and `free.offset` are for load factor
+    1.
     """
 
     case: Case
@@ -149,13 +149,11 @@ class Scene:
     mesh: CutMesh
     body: np.ndarray
     blocks: list[Block]
-    mean: MeanStress
+    parts: tuple[Part, ...]
     fixed: dict[str, Fixed]
     rigid: dict[str, Frame]
     free: FreeMotion
     force: np.ndarray
-    initial: StrainLoads
-    springs: sparse.csr_matrix
     probed: dict[str, np.ndarray]
     acted: dict[str, np.ndarray]
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
@@ -164,16 +162,22 @@ class Scene:
 
     def acting(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
         """Forces (n, dim) and imposed displacements (n_dofs,) of a step."""
-        strained = self.straining(step, self.initial.force)
-        if not isinstance(step, dict):
-            return step * self.force + strained, step * self.free.offset
-        parts = [(step.get(name, 1.0), *part) for name, part in self.histories.items()]
-        force = np.sum([f * force for f, force, _ in parts], axis=0)
-        return force + strained, np.sum([f * offset for f, _, offset in parts], axis=0)
+        force, offset = self.given_loads(step)
+        return sum((part.load(step) for part in self.parts), force), offset
 
-    def straining(self, step: Step, values: np.ndarray) -> np.ndarray:
-        """The sum of `values` (k, …) of the initial strains, with their factors in a step."""
-        return np.tensordot(strain_factors(self.case, step), values, axes=1)
+    def given_loads(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
+        """The same without the forces of parts."""
+        if not isinstance(step, dict):
+            return step * self.force, step * self.free.offset
+        named = [(step.get(name, 1.0), *loads) for name, loads in self.histories.items()]
+        force = np.sum([f * force for f, force, _ in named], axis=0)
+        return force, np.sum([f * offset for f, _, offset in named], axis=0)
+
+    @property
+    def resisting(self) -> sparse.csr_matrix:
+        """Rows (k, n_dofs) of parts that resist the motions of bodies."""
+        rows = [part.resisting for part in self.parts if part.resisting is not None]
+        return sparse.vstack([sparse.csr_matrix((0, self.n_dofs)), *rows]).tocsr()
 
     @property
     def n_dofs(self) -> int:
@@ -227,10 +231,9 @@ def build_scene(
             for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
         ]
     with stage(clock, "assembly"):
-        blocks, mean = groups.elasticity(safeguards.mixed, options.shortcuts.quadrature)
-        free = groups.supports()
-        force, springs = groups.forces(), springs_of(groups)
-        initial = strain_loads_of(groups, blocks, mean)
+        blocks = groups.elasticity(options.shortcuts.quadrature)
+        blocks, parts = parts_of(groups, blocks, safeguards.mixed)
+        free, force = groups.supports(), groups.forces()
         zones = _zones(case, cut_zones, surfaces, operators, free)
         slave = np.zeros(len(cut_mesh.points), dtype=bool)
         for block in (block for faces in sub_faces for block in faces):
@@ -253,13 +256,11 @@ def build_scene(
         mesh=cut_mesh,
         body=groups.body,
         blocks=blocks,
-        mean=mean,
+        parts=parts,
         fixed=groups.fixed,
         rigid=groups.frames,
         free=free,
         force=force,
-        initial=initial,
-        springs=springs,
         probed={n: groups.nodes(p.group, "probes") for n, p in case.probes.items() if p.group},
         acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
         histories=groups.histories(),
