@@ -11,7 +11,7 @@ scikit-fem, and nothing else of this program. Its files in the order of the meth
 - `pairing`, `clipping`, `regions`, `segments`: mortar segments and points on them
 - `partners`: the surface that a macro-element meets, and its area
 - `multipliers`, `operator`: the gap operator B, its sums as exact as the area
-- `friction`: Coulomb's law of each macro-element, and its slip
+- `friction`: the slip of each macro-element
 - `motions`: rigid motions of bodies, and what resists them
 - `status`: which macro-elements are closed
 - `reconstruction`, `recovery`: a pressure of second order

@@ -20,7 +20,7 @@ from ..simulation.results.solution import (
 
 _OF_STEP = (
     *("factor", "iterations", "status_changes", "residual", "complementarity"),
-    *("dissipation", "contraction"),
+    "dissipation",
 )
 _RESULTANTS = ("area", "force", "moment", "pressure", "friction", "stick")
 _OBSERVED = ("pressure", "gap", "status", "coverage")

@@ -223,6 +223,5 @@ def of_each_row(true: Wrapped) -> Wrapped:
     def init(contact: Any, stiffness: np.ndarray, *others: Any) -> None:
         true(contact, stiffness, *others)
         contact.c = np.abs(np.diag(stiffness))
-        contact._slope = contact.stiffness - np.diag(contact.c)
 
     return init

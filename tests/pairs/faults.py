@@ -35,8 +35,9 @@ class Fault:
 
 
 def _sorted_rows(true: Any) -> Any:
-    def init(self: Any, stiffness: Any, friction: Any, of: Any, rows: np.ndarray) -> None:
-        true(self, stiffness, friction, of, np.sort(rows, axis=None).reshape(rows.shape))
+    def init(self: Any, *given: Any) -> None:
+        *others, rows = given
+        true(self, *others, np.sort(rows, axis=None).reshape(rows.shape))
 
     return init
 

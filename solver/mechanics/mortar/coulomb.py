@@ -7,13 +7,18 @@ tractions times areas. For a = λ − c z with any c > 0 the law is
     λ_n = max(0, a_n),    λ_t = a_t, or b a_t / |a_t| where that is shorter, b = μ max(0, a_n).
 
 Its derivative has d b = μ d a_n, which bounds from the iteration before leave out, and across the
-slip b/|a_t| (1 − d dᵀ). Source: Alart, Curnier, A mixed formulation for frictional contact problems
-prone to Newton like solution methods, CMAME 92 (1991) 353–375.
+slip b/|a_t| (1 − d dᵀ). S is a matrix, or, for a large contact, a product by one back-solve; then
+Newton's systems are solved by GMRES.
+
+Source: Alart, Curnier, A mixed formulation for frictional contact problems prone to Newton like
+solution methods, CMAME 92 (1991) 353–375.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
 
 # Iterations, and the fault of the law by the largest force that ends them: at once, or where it
 # falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits.
@@ -23,6 +28,9 @@ UNIQUE = 1.0
 """Up to this coefficient the first state found is taken for the only one."""
 # A step of the line search is halved down to this.
 _SHORTEST = 1e-3
+# Where S is a product: the fault that Newton's method ends with, the shares of a fault that GMRES
+# leaves of a large one and at most, its restart and restarts.
+_INEXACT, _SHARE, _LARGEST, _RESTART, _RESTARTS = 1e-6, 0.1, 1e-2, 200, 5
 
 
 @dataclass(frozen=True)
@@ -43,20 +51,25 @@ class _Law:
 class CoulombContact:
     """The contact of m gaps and of f macro-elements with friction, which slip along k tangents.
 
-    `stiffness` S (r, r): rows of the gaps come first; `friction` μ (f,); `of` (f,): the gap each
-    one has; `rows` (k, f): those of its slips, by tangent, in any order.
+    `stiffness` S (r, r), symmetric, a matrix or a product: rows of the gaps come first; `diagonal`
+    (r,) is about that of S; `friction` μ (f,); `of` (f,): the gap each one has; `rows` (k, f):
+    those of its slips, by tangent, in any order.
     """
 
     def __init__(
-        self, stiffness: np.ndarray, friction: np.ndarray, of: np.ndarray, rows: np.ndarray
+        self,
+        stiffness: np.ndarray | LinearOperator,
+        diagonal: np.ndarray,
+        friction: np.ndarray,
+        of: np.ndarray,
+        rows: np.ndarray,
     ):
-        self.stiffness, self.friction, self.of = (stiffness + stiffness.T) / 2, friction, of
-        self.m, self.rows = len(stiffness) - rows.size, list(rows)
-        self.c = np.abs(np.diag(stiffness))
+        self.stiffness, self.friction, self.of = stiffness, friction, of
+        self.m, self.rows = len(diagonal) - rows.size, list(rows)
+        self.c = np.abs(diagonal)
         # One for all tangents of a macro-element, or its traction would not be along its slip.
         for rows in self.rows:
-            self.c[rows] = np.mean([np.diag(stiffness)[each] for each in self.rows], axis=0)
-        self._slope = self.stiffness - np.diag(self.c)
+            self.c[rows] = np.mean([np.abs(diagonal)[each] for each in self.rows], axis=0)
 
     def solve(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Forces λ (r,), jumps z (r,) and the iterations, for λ₀ = `forces` (r,); None where none.
@@ -68,7 +81,8 @@ class CoulombContact:
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
 
-        >>> contact = CoulombContact(np.eye(2), np.array([0.5]), np.array([0]), np.array([[1]]))
+        >>> one, friction = np.ones(2), np.array([0.5])
+        >>> contact = CoulombContact(np.eye(2), one, friction, np.array([0]), np.array([[1]]))
         >>> found, jump, _ = contact.solve(np.array([2.0, 1.5]))
         >>> found.round(12).tolist(), (-jump[1:]).round(12).tolist()
         ([2.0, 1.0], [0.5])
@@ -93,28 +107,27 @@ class CoulombContact:
         unit = (along / np.where(size > 0, size, 1.0)).ravel()
         bound = np.tile(self.friction, len(self.rows)) * unit
         of = np.tile(self.of, len(self.rows))
+
+        def fault(_: np.ndarray, forces: np.ndarray) -> np.ndarray:
+            return forces[rows] - bound[:, None] * forces[of]
+
         z = np.zeros(len(start))
-        matrix = (
-            self.stiffness[np.ix_(rows, rows)] - bound[:, None] * self.stiffness[np.ix_(of, rows)]
-        )
-        z[rows] = np.linalg.lstsq(matrix, bound * start[of] - start[rows], rcond=None)[0]
+        z[rows] = self._solved(fault, rows, bound * start[of] - start[rows])
         return z
 
     def _newton(
         self, z: np.ndarray, start: np.ndarray, searches: bool
     ) -> tuple[_Law, np.ndarray, int] | None:
         """The law fulfilled, its z (r,), and the steps from `z` on; `searches`: along each step."""
-        best = np.inf
+        best, exact = np.inf, _EXACT if isinstance(self.stiffness, np.ndarray) else _INEXACT
         for count in range(_MOST):
-            law = self._law(z, start)
+            law = self._law(z, start + self.stiffness @ z)
             fault = float(np.abs(law.fault).max(initial=0.0))
             enough = _ENOUGH if count < _LATE else _ROUNDED
-            if fault < _EXACT or (fault < enough and fault > _STALLED * best):
+            if fault < exact or (fault < enough and fault > _STALLED * best):
                 return law, z, count
             best = min(best, fault)
-            try:
-                step = np.linalg.solve(self._derivative(law), -law.fault)
-            except np.linalg.LinAlgError:
+            if not np.isfinite(step := self._step(law)).all():
                 return None
             z = z + (self._length(z, step, law, start) if searches else 1.0) * step
         return None
@@ -125,9 +138,8 @@ class CoulombContact:
         Also the fault before it, by the largest force.
         """
         size = np.abs(forces).max(initial=0.0) or 1.0
-        law = self._law(jump / size, (forces - self.stiffness @ jump) / size)
-        step = np.linalg.solve(self._derivative(law), -law.fault)
-        return jump + size * step, float(np.abs(law.fault).max(initial=0.0))
+        law = self._law(jump / size, forces / size)
+        return jump + size * self._step(law), float(np.abs(law.fault).max(initial=0.0))
 
     def statuses(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which gaps are closed (m,), and which macro-elements slip (f,).
@@ -142,42 +154,72 @@ class CoulombContact:
         bound = self.friction * np.maximum(forces[:m][self.of], 0.0)
         return closed, closed[self.of] & (far > bound - along)
 
-    def _length(self, z: np.ndarray, step: np.ndarray, law: _Law, forces: np.ndarray) -> float:
+    def _length(self, z: np.ndarray, step: np.ndarray, law: _Law, start: np.ndarray) -> float:
         """The share of a step that lowers the fault; all of it where none does."""
-        length, now = 1.0, np.linalg.norm(law.fault)
+        length, now, along = 1.0, np.linalg.norm(law.fault), self.stiffness @ step
+        forces = start + self.stiffness @ z
         while length > _SHORTEST:
-            if (
-                np.linalg.norm(self._law(z + length * step, forces).fault)
-                < (1 - 1e-4 * length) * now
-            ):
+            then = self._law(z + length * step, forces + length * along)
+            if np.linalg.norm(then.fault) < (1 - 1e-4 * length) * now:
                 return length
             length /= 2
         return 1.0
 
-    def _law(self, z: np.ndarray, start: np.ndarray) -> _Law:
-        forces, m = start + self.stiffness @ z, self.m
-        a = forces - self.c * z
+    def _law(self, z: np.ndarray, forces: np.ndarray) -> _Law:
+        a, m = forces - self.c * z, self.m
         normal = np.maximum(a[:m], 0.0)
         along = np.array([a[rows] for rows in self.rows])
         size, bound = np.linalg.norm(along, axis=0), self.friction * normal[self.of]
         slips, length = size > bound, np.where(size > 0, size, 1.0)
         unit = along / length
-        fault = [forces[:m] - normal]
-        fault += [
-            forces[r] - np.where(slips, bound * u, t)
-            for r, u, t in zip(self.rows, unit, along, strict=True)
-        ]
-        return _Law(np.concatenate(fault), forces, a[:m] > 0, slips, unit, bound / length)
+        fault = forces.copy()
+        fault[:m] -= normal
+        for rows, u, t in zip(self.rows, unit, along, strict=True):
+            fault[rows] -= np.where(slips, bound * u, t)
+        return _Law(fault, forces, a[:m] > 0, slips, unit, bound / length)
 
-    def _derivative(self, law: _Law) -> np.ndarray:
-        """The derivative (r, r) of the fault by z."""
-        found, slope, m = self.stiffness.copy(), self._slope, self.m
-        found[:m] -= law.closed[:, None] * slope[:m]
-        pressed = (self.friction * law.closed[self.of])[:, None] * slope[self.of]
-        for i, rows in enumerate(self.rows):
-            sliding = law.unit[i][:, None] * pressed
-            for j, other in enumerate(self.rows):
-                across = law.share * ((i == j) - law.unit[i] * law.unit[j])
-                sliding = sliding + across[:, None] * slope[other]
-            found[rows] -= np.where(law.slips[:, None], sliding, slope[rows])
-        return found
+    def _step(self, law: _Law) -> np.ndarray:
+        """Newton's step (r,) for a law; not finite where there is none."""
+
+        def fault(z: np.ndarray, forces: np.ndarray) -> np.ndarray:
+            slope, found, m = forces - self.c[:, None] * z, forces.copy(), self.m
+            found[:m] -= law.closed[:, None] * slope[:m]
+            pressed = (self.friction * law.closed[self.of])[:, None] * slope[self.of]
+            for i, rows in enumerate(self.rows):
+                sliding = law.unit[i][:, None] * pressed
+                for j, other in enumerate(self.rows):
+                    across = law.share * ((i == j) - law.unit[i] * law.unit[j])
+                    sliding = sliding + across[:, None] * slope[other]
+                found[rows] -= np.where(law.slips[:, None], sliding, slope[rows])
+            return found
+
+        return self._solved(fault, np.arange(len(self.c)), -law.fault)
+
+    def _solved(
+        self,
+        fault: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        rows: np.ndarray,
+        wanted: np.ndarray,
+    ) -> np.ndarray:
+        """The jumps (s,) in `rows` whose linear `fault` is the `wanted` one (s,); NaN where none.
+
+        `fault` takes jumps (r, j) and the forces (r, j) they bring up, column by column.
+        """
+        size, count = len(self.c), len(rows)
+        if isinstance(self.stiffness, np.ndarray):
+            unit = np.zeros((size, count))
+            unit[rows, np.arange(count)] = 1.0
+            try:
+                return np.linalg.solve(fault(unit, self.stiffness[:, rows]), wanted)
+            except np.linalg.LinAlgError:
+                return np.full(count, np.nan)
+
+        def product(values: np.ndarray) -> np.ndarray:
+            z = np.zeros((size, 1))
+            z[rows, 0] = values.ravel() / self.c[rows]
+            return fault(z, (self.stiffness @ z[:, 0])[:, None])[:, 0]
+
+        matrix = LinearOperator((count, count), matvec=product, dtype=float)
+        left = np.clip(_SHARE * np.abs(wanted).max(initial=0.0), _INEXACT, _LARGEST)
+        most = {"restart": _RESTART, "maxiter": _RESTARTS}
+        return np.asarray(gmres(matrix, wanted, rtol=left, **most)[0] / self.c[rows])

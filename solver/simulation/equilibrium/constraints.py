@@ -333,8 +333,7 @@ def free_stiffness(scene: Scene, unknowns: Unknowns, single: bool) -> tuple[Stif
     `single`: in single precision where multigrid solves.
     """
     free, added = scene.free, [part for part in scene.parts if part.stiffness is not None]
-    # Friction adds springs to the matrix.
-    iterative = not (scene.case.frictional or against_multigrid(len(unknowns.node), unknowns))
+    iterative = not against_multigrid(len(unknowns.node), unknowns)
     plain = free.selection is not None and not added
     in_blocks = plain and iterative and scene.points.shape[1] == 3
     blocks = stiffness(scene.points, scene.blocks, single and in_blocks)

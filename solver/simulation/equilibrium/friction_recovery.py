@@ -14,9 +14,10 @@ import numpy as np
 from scipy import sparse
 
 from ...case.acting import Step
+from ...lac.errors import SolveError
 from ...lac.recovery import settled_means
 from ..scene.scene import ZoneScene
-from .friction import Search, solve_with_friction, status_of
+from .friction import Search
 from .problem import ContactProblem
 from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered, settles
 from .state import Equilibrium
@@ -86,28 +87,25 @@ def solve_and_recover(
     Where the state does not settle under the correction, it stays as it is and no pressure is
     recovered. Raises SolveError where there is no equilibrium.
     """
-    state = solve_with_friction(problem, step, before)
+    search = Search(problem, step, before)
+    state = search.settled()
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
     sweeps = max((z.operator.recovery.form.sweeps for z in given if z.operator.recovery), default=0)
     if not sweeps or not state.status.closed.any():
         return recovered(problem, state, step)
-    search, latest = Search(problem, step, before), state
-    search.count, search.changes = state.status.iterations, list(state.status.changes)
+    latest, under_now = state, np.zeros(state.force.size)
 
     def added(values: np.ndarray) -> np.ndarray:
         forces = (_Loads.of(zone, latest).force(values) for zone in given)
         return sum(forces, np.zeros(state.force.size))
 
     def under(force: np.ndarray) -> Equilibrium:
-        search.correction = force.reshape(state.force.shape)
-        found = search.settled() or search.from_status(status_of(problem, latest))
-        if found is None:
-            raise _UnsettledError
-        return found
+        return search.settled(force.reshape(state.force.shape))
 
     def change(force: np.ndarray) -> np.ndarray:
-        nonlocal latest
-        before, latest = latest, under(search.correction.ravel() + force)
+        nonlocal latest, under_now
+        under_now = under_now + force
+        before, latest = latest, under(under_now)
         return latest.pressure - before.pressure
 
     nothing = np.zeros(state.force.size)
@@ -118,8 +116,8 @@ def solve_and_recover(
         couples = (each.couple(values) for each in loads)
         found = replace(under(sum(forces, nothing)), couple=sum(couples, np.zeros(3)))
         if not settles(first, values, found):
-            raise _UnsettledError
-    except _UnsettledError:
+            raise SolveError("the sweeps diverge")
+    except SolveError:
         _LOG.info(
             "recovery: the state does not settle; pressure and traction stay constant by face"
         )
@@ -135,7 +133,3 @@ def solve_and_recover(
         )
         for each, force in zip(loads, forces, strict=True)
     }
-
-
-class _UnsettledError(Exception):
-    """A sweep has no state, or the sweeps diverge."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
@@ -13,12 +14,11 @@ from ...lac.motions import rigid_motions, unsupported
 from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.fem.displacement import Displacement
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
-from ...mechanics.linear.symmetric_blocks import Stiffness
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
-from ..scene.parts.part import Part
 from ..scene.scene import Scene
 from .constraints import (
+    ContactConstraints,
     RigidMotions,
     contact_constraints,
     first_guess,
@@ -53,6 +53,8 @@ _LARGE = 100_000
 # While the contact status is sought by an iterative solver: residuals of the first solve and of
 # changes, and the share of pressures and motions below which such a solve decides nothing.
 _ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
+# More rows than this make the matrix of the contact alone too large.
+_MOST_ROWS = 4000
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -67,9 +69,8 @@ class ContactProblem:
         motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         self._motions = RigidMotions.of(scene, self.constraints, motions)
         self._moves: dict[bytes, str] = {}
-        self._contact_stiffness: np.ndarray | None = None
-        self._without: tuple[Scene, Stiffness, Systems] | None = None
-        refuse_unsolvable(scene, self._free_motion(self.constraints.eligible), self.constraints)
+        self._contact_stiffness: tuple[np.ndarray | LinearOperator, np.ndarray] | None = None
+        refuse_unsolvable(scene, self.free_motion(self.constraints.eligible), self.constraints)
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
         loose = unsupported(motions, self._motions.supports)
         self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
@@ -77,9 +78,7 @@ class ContactProblem:
         if (resisting := scene.resisting).shape[0]:
             self.unsupported = unsupported(motions, self._motions.supports, resisting)
         refined = scene.options.safeguards.refinement
-        # Springs of friction are added to a matrix in double precision.
-        large = scene.n_dofs >= SINGLE_FROM and not scene.case.frictional
-        self.single = refined and large
+        self.single = refined and scene.n_dofs >= SINGLE_FROM
         del motions  # memory for the stiffness
         self._assemble()
         self._rough = roughness(scene)
@@ -143,13 +142,13 @@ class ContactProblem:
         if bilateral:
             return self.equilibrium(step, eligible, correction)
         guess: Callable[[], np.ndarray] | None
-        guess = partial(first_guess, scene, self.constraints, step, self._free_motion)
+        guess = partial(first_guess, scene, self.constraints, step, self.free_motion)
         if not scene.options.shortcuts.status:
             start = eligible
         elif start is None:
             start, guess = guess(), None
         elif before is not None:
-            about = scene, self.constraints, self._free_motion
+            about = scene, self.constraints, self.free_motion
             start = moved(start, before, step, *about)
         latest: list[Equilibrium] = []
         rough, known = scene.options.shortcuts.status, None
@@ -186,38 +185,19 @@ class ContactProblem:
         return self._refined(first, _force_scale(first), correction)
 
     def with_jumps(
-        self, step: Step, jump: np.ndarray, correction: np.ndarray | float
+        self, step: Step, jump: np.ndarray, before: np.ndarray, correction: np.ndarray | float
     ) -> Equilibrium:
-        """Equilibrium with the mean gaps and slips `jump` (k,) imposed on all that may close."""
+        """Equilibrium with mean gaps and slips imposed on all that may close.
+
+        `jump` (k,): what they have more than `before` (k,).
+        """
         base = self.constraints
-        self.constraints = replace(base, initial=base.initial - base.covered * jump)
-        try:
-            found = self.equilibrium(step, base.eligible, correction)
-        finally:
-            self.constraints = base
+        imposed = replace(base, initial=base.initial - base.covered * (jump + before))
+        first = self._at_rest(base.eligible, step, correction, imposed)
+        found = self._refined(first, _force_scale(first), correction)
         iterate = replace(found.iterate, constraints=base)
         trial = replace(found.trial, gap=np.where(base.eligible, jump, iterate.gap))
         return replace(found, iterate=iterate, trial=trial)
-
-    def count_slip_from(self, jump: np.ndarray) -> None:
-        """Slip is what the jump of displacement (k,) has more than this, in the rows of slip."""
-        constraints = self.constraints
-        initial = np.where(constraints.normal, constraints.initial, -jump * constraints.covered)
-        self.constraints = replace(constraints, initial=initial)
-
-    def hold_across(self, part: Part | None) -> None:
-        """Add a part to those of the scene, in place of any added before."""
-        if part is None and self._without is None:
-            return
-        if self._without is None:
-            self._without = self.scene, self.matrix, self._systems
-        self.scene, self.matrix, self._systems = self._without
-        if part is None:
-            self._without = None
-            return
-        self.scene = replace(self.scene, parts=(*self.scene.parts, part))
-        self.matrix = self.matrix + self.scene.free.reduced(part.stiffness)
-        self._systems = self._systems_of(self.matrix)
 
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
         """The state with another `correction` (n, dim), its status kept.
@@ -248,7 +228,7 @@ class ContactProblem:
         found[closed] = system.multiplier(-(self.matrix @ change))
         return found
 
-    def _free_motion(self, closed: np.ndarray) -> str:
+    def free_motion(self, closed: np.ndarray) -> str:
         """See `free_motion`; the last answer is kept, as a guess is asked about more than once."""
         key = closed.tobytes()
         if key not in self._moves:
@@ -256,34 +236,27 @@ class ContactProblem:
         return self._moves[key]
 
     def _at_rest(
-        self, closed: np.ndarray, step: Step, correction: np.ndarray | float
+        self,
+        closed: np.ndarray,
+        step: Step,
+        correction: np.ndarray | float,
+        constraints: ContactConstraints | None = None,
     ) -> ContactIterate:
         """The start of a solve with the given multipliers closed."""
         scene = self.scene
-        if moves := self._free_motion(closed):
-            raise SolveError(f"{moves} {self._loose(closed)}, or a support is missing")
+        if moves := self.free_motion(closed):
+            count = int((~closed[self.constraints.normal]).sum())
+            loads = f"once {count} macro-elements are open: the loads part the bodies"
+            raise SolveError(f"{moves} {loads}, or a support is missing")
         acting, offset = scene.acting(step)
         return ContactIterate(
             scene=scene,
-            constraints=self.constraints,
+            constraints=constraints or self.constraints,
             closed=closed,
             force=acting + correction,
             displacement=self.at_rest.moved(offset),
             inner=tuple(part.start(step) for part in scene.parts),
         )
-
-    def _loose(self, closed: np.ndarray) -> str:
-        """How many macro-elements do not hold, and what the loads have done."""
-        loose, slips = ~closed[self.constraints.normal], False
-        for zone in self.scene.zones:
-            for rows in zone.slips[:1]:
-                loose[zone.numbers] |= ~closed[rows]
-                slips = True
-        count = int(loose.sum())
-        if not slips:
-            return f"once {count} macro-elements are open: the loads part the bodies"
-        words = "the loads part the bodies or overcome friction"
-        return f"once {count} macro-elements are open or slip: {words}"
 
     def _roughly(
         self, start: ContactIterate, known: ContactIterate | None
@@ -371,11 +344,34 @@ class ContactProblem:
             raise SolveError("no contact pressure balances the loads")
         return self.stiffness_of(eligible)
 
-    def contact_stiffness(self) -> np.ndarray:
-        """`stiffness_of` all that may close or stick; made once, for all steps."""
+    def contact_stiffness(self) -> tuple[np.ndarray | LinearOperator, np.ndarray]:
+        """`stiffness_of` all that may close or stick (e, e), and about its diagonal (e,).
+
+        Made once, for all steps. For a large contact it is a product, by one solution each.
+        """
         if self._contact_stiffness is None:
-            self._contact_stiffness = self.stiffness_of(self.constraints.eligible)
+            rows = self.constraints.eligible
+            if rows.sum() <= _MOST_ROWS:
+                found = self.stiffness_of(rows)
+                found = (found + found.T) / 2
+                self._contact_stiffness = found, np.diag(found)
+            else:
+                self._contact_stiffness = self._product_of(rows)
         return self._contact_stiffness
+
+    def _product_of(self, rows: np.ndarray) -> tuple[LinearOperator, np.ndarray]:
+        system, area = self._systems.factored(rows), self.constraints.covered[rows]
+        nothing, size = np.zeros(self.matrix.shape[0]), len(area)
+
+        def product(jump: np.ndarray) -> np.ndarray:
+            change = system.correction(nothing, area * jump.ravel())
+            return area * system.multiplier(-(self.matrix @ change))
+
+        stiff = self.diagonal > 0  # rigid unknowns have none
+        moving = self.constraints.gaps[rows].power(2)[:, stiff]
+        soft = np.asarray(moving @ (1 / self.diagonal[stiff]))
+        diagonal = area**2 / np.where(soft > 0, soft, soft.max(initial=0.0) or 1.0)
+        return LinearOperator((size, size), matvec=product, dtype=float), diagonal
 
     def stiffness_of(self, rows: np.ndarray) -> np.ndarray:
         """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed."""

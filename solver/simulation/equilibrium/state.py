@@ -23,7 +23,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -37,10 +36,6 @@ from ...mechanics.fem.block import Block
 from ...mechanics.fem.stress import steepest, steepness
 from ..scene.scene import Scene
 from .iterate import ContactIterate
-
-if TYPE_CHECKING:
-    from ...lac.friction import Slip
-
 
 EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
@@ -306,18 +301,15 @@ def _largest(gaps: sparse.csr_matrix) -> tuple[np.ndarray, np.ndarray, np.ndarra
 class Friction:
     """The state of friction after a step.
 
-    `slip`: see `lac.friction`; `slipping` (k,) of the multipliers of gaps; `jump`, `total` (k,) in
-    the rows of slip: the mean jump between the surfaces, and what they slipped in all steps;
-    `dissipation`: the work of friction in this step, `contraction`: the change of the bounds
-    that pressures yield, over that of the bounds solved with (0: nothing slips).
+    `slipping` (k,) of the multipliers of gaps; `jump`, `total` (k,) in the rows of slip: the mean
+    jump between the surfaces, and what they slipped in all steps; `dissipation`: the work of
+    friction in this step.
     """
 
-    slip: Slip
     slipping: np.ndarray
     jump: np.ndarray
     total: np.ndarray
     dissipation: float
-    contraction: float
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -99,27 +99,20 @@ def plan_notes(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterat
     if scene.options.shortcuts.status and len(different) < len(states):
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
-    yield from _friction(max((z.zone.friction for z in scene.zones), default=0.0), states)
+    if scene.case.frictional:
+        yield from _friction(max(z.zone.friction for z in scene.zones), states)
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
 
 
 def _friction(largest: float, states: Sequence[Equilibrium]) -> Iterator[Line]:
     """What is certain about a state with friction, and what is not."""
-    rates = [state.friction.contraction for state in states if state.friction]
-    if not rates:
-        return
-    path = "one step from rest" if len(rates) == 1 else f"a path of {len(rates)} steps from rest"
+    path = "one step from rest" if len(states) == 1 else f"a path of {len(states)} steps from rest"
     yield Line(f"friction: {path}", "the state depends on the order and the size of the steps")
     from ...mechanics.mortar.coulomb import UNIQUE  # friction alone
 
     if largest > UNIQUE:
         what = f"friction: for a coefficient of {largest:g} other states may exist"
         yield Line(what, "of those found, most of the contact stays closed in this one")
-    if max(rates) > 0:
-        what = f"friction: bounds of slip contract to {max(rates):.2g} of their error by iteration"
-        only = "the state is the only one nearby; for a large coefficient there may be others"
-        why = only if max(rates) < 1 else "there may be other states nearby"
-        yield Line(what, why)
 
 
 def estimated(solution: Solution) -> Iterator[Line]:

@@ -255,7 +255,6 @@ def step_results(
                 reactions=held,
                 rigid=rigid_bodies(scene, state),
                 dissipation=state.friction.dissipation if state.friction else 0.0,
-                contraction=state.friction.contraction if state.friction else 0.0,
             )
         )
     return results, at_nodes

@@ -221,7 +221,7 @@ class StepResult:
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
     by zone, `reactions` and motions of `rigid` bodies.
-    `dissipation`: the work of friction in the step; `contraction`: see `problem.Friction`.
+    `dissipation`: the work of friction in the step.
     """
 
     factor: float
@@ -234,7 +234,6 @@ class StepResult:
     reactions: list[Reaction] = field(default_factory=list)
     rigid: list[RigidMotion] = field(default_factory=list)
     dissipation: float = 0.0
-    contraction: float = 0.0
 
 
 @dataclass
