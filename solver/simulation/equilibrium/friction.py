@@ -118,7 +118,7 @@ class Search:
             limit[self.rows] = np.inf
         of_gaps = np.zeros(k, dtype=bool)
         of_gaps[self.gaps] = slips
-        work = (pressure * gap)[self.rows].sum(axis=0) @ base.covered[self.gaps]
+        work = _work(pressure[self.rows], gap[self.rows], base.covered[self.gaps])
         return replace(
             found,
             iterate=found.iterate.with_closed(rows),
@@ -130,5 +130,10 @@ class Search:
                 gap_limit=limits[1],
             ),
             status=StatusResult(closed, self.count, []),
-            friction=Friction(of_gaps, jump, total, float(-work) + 0.0),
+            friction=Friction(of_gaps, jump, total, work),
         )
+
+
+def _work(traction: np.ndarray, slip: np.ndarray, area: np.ndarray) -> float:
+    """The work of friction, which resists the slip: of tractions and slips (k, f) on areas (f,)."""
+    return float(-(traction * slip).sum(axis=0) @ area) + 0.0

@@ -27,7 +27,7 @@ from .cut_groups import CutZone, Surfaces, refuse_bent, surfaces_of
 from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of, with_contact_frames
 from .parts import parts_of
-from .parts.part import Part
+from .parts.part import ModelPart
 from .rigid import Frame
 from .selections import with_groups
 
@@ -149,7 +149,7 @@ class Scene:
     mesh: CutMesh
     body: np.ndarray
     blocks: list[Block]
-    parts: tuple[Part, ...]
+    parts: tuple[ModelPart, ...]
     fixed: dict[str, Fixed]
     rigid: dict[str, Frame]
     free: FreeMotion

@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ....mechanics.fem.block import Block
-from .part import Part
+from .part import ModelPart
 
 if TYPE_CHECKING:
     from ..attributes import Attributes
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 def parts_of(
     groups: Attributes, blocks: list[Block], in_mixed_form: bool = True
-) -> tuple[list[Block], tuple[Part, ...]]:
+) -> tuple[list[Block], tuple[ModelPart, ...]]:
     """The elastic blocks of cells that are left, and the parts that the case asks for.
 
     Without `in_mixed_form` no cell is, whatever the case says.
     """
-    case, parts, strain = groups.case, list[Part](), None
+    case, parts, strain = groups.case, list[ModelPart](), None
     if any(support.spring for support in case.supports):
         from .springs import springs_of
 

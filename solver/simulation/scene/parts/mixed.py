@@ -13,7 +13,7 @@ from ....mechanics.fem.block import Block
 from ....mechanics.fem.displacement import Displacement
 from ....mechanics.fem.faces import volume_cells
 from ....mechanics.fem.mixed import MeanStress, split
-from .part import Nodal, Part, Term
+from .part import ModelPart, Nodal, Term
 
 if TYPE_CHECKING:
     from ..attributes import Attributes
@@ -57,7 +57,7 @@ class _MixedTerm(Term):
         return self._mean.by_cell(self._stress, cells)
 
 
-class MixedForm(Part):
+class MixedForm(ModelPart):
     """The mean stress of all cells in mixed form, beside their blocks with λ = 0."""
 
     factored = "nearly incompressible cells: multigrid does not converge"

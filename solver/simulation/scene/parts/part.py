@@ -42,7 +42,7 @@ class Term:
         return {}
 
 
-class Part:
+class ModelPart:
     """A part of a model beside its elastic cells. What is not stated is nothing."""
 
     holder = ""

@@ -11,7 +11,7 @@ from ....mechanics.fem.loads import Field, at_nodes, foundation
 from ....system.errors import InputError
 from ..cut_groups import CutGroups
 from ..groups import ALL
-from .part import Part, Term
+from .part import ModelPart, Term
 
 
 class _SpringTerm(Term):
@@ -19,7 +19,7 @@ class _SpringTerm(Term):
         self.force = self.ground = force
 
 
-class Springs(Part):
+class Springs(ModelPart):
     """Springs of a stiffness (n_dofs, n_dofs) that hold bodies of `shape` (n, dim)."""
 
     holder = "springs"

@@ -19,7 +19,7 @@ from ....mechanics.fem.displacement import Displacement
 from ....mechanics.fem.loads import StrainLoads, strain_loads
 from ....mechanics.fem.stress import COMPONENTS
 from ..groups import ALL
-from .part import Nodal, Part, Term
+from .part import ModelPart, Nodal, Term
 
 if TYPE_CHECKING:
     from ..attributes import Attributes
@@ -96,7 +96,7 @@ class _StrainTerm(Term):
         return float(own / 2 - moved @ force.ravel())
 
 
-class InitialStrain(Part):
+class InitialStrain(ModelPart):
     """The initial strains of a case in its blocks of cells."""
 
     def __init__(self, groups: Attributes, blocks: list[Block], strains: Strains):
