@@ -23,6 +23,7 @@ class Check:
     quantity (`verification.checks`), `fixed` whether that measure holds even where the reference is
     not zero, `accepted` the tolerance against the accepted value, `like` the check whose tolerance
     holds where its own is not given. `needs`, of errors in norms: what an exact solution must have.
+    `when`: what a case must be for the check to run, a property of it.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Check:
     alias: str | None = None
     key: str | None = None
     needs: str = ""
+    when: str = ""
     tolerance: float | None = None
     fixed: bool = False
     by_zone: bool = True
@@ -120,7 +122,7 @@ CHECKS: tuple[Check, ...] = (
     Check("friction_law",
           "Coulomb's law: traction within μp, along the slip, none without contact; work of "
           "friction",
-          "friction_law", "unit", tolerance=1e-09, fixed=True),
+          "friction_law", "unit", when="frictional", tolerance=1e-09, fixed=True),
     Check("friction_traction", "traction of friction on every contact element of the slave",
           "friction", "load", of="friction_traction", key="friction_traction"),
     Check("slip", "slip of the master on every contact element, in the last step", "friction",

@@ -49,10 +49,12 @@ def _faults(case: Case) -> Iterator[Fault]:
     yield from _in_zones(case)
     yield from _in_steps(case)
     yield from _listed_twice(case)
-    yield from _in_probes(case)
+    if case.probes:
+        yield from _in_probes(case)
     yield from _in_errors(case)
     yield from _in_reference(case)
-    yield from _in_rigid(case)
+    if case.rigid:
+        yield from _in_rigid(case)
     for group, material in case.materials.items():
         if case.thin and material.form == "mixed":
             allowed = "plane stress has no incompressible limit; allowed: automatic, displacement"
@@ -218,7 +220,8 @@ def _of_dimension(case: Case, dim: int) -> Iterator[Fault]:
             shown = [v.text if isinstance(v, Expression) else v for v in vector]
             yield key, shown, allowed
     yield from _in_motion(case, dim)
-    yield from _in_strains(case, dim)
+    if any(load.strains for load in case.loads):
+        yield from _in_strains(case, dim)
     if dim == 3:
         return
     for i, support in enumerate(case.supports):

@@ -14,7 +14,7 @@ import numpy as np
 from ..lac.cells.faces import outer_faces
 from ..mechanics.fem.faces import volume_cells
 from ..simulation.results.solution import Solution, ZoneResult
-from ..simulation.scene.rigid import quadric_of
+from ..simulation.scene.holdings.rigid_surfaces import quadric_of
 from ..verification.units import with_unit
 from .charts import BLUE, PAPER
 from .layout import RELATIVE, STATUS, edge_color, mixed, tint, ways_apart

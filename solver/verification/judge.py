@@ -126,7 +126,7 @@ def judge(
         units=derived(solution.case.units, spatial),
         forces=list(_forces(solution)),
         dissipation=[step.dissipation for step in solution.steps] if case.frictional else [],
-        probes=list(_probes(solution)),
+        probes=list(_probes(solution)) if solution.probes else [],
         largest_displacement=solution.largest_displacement[0],
         attainable=accuracy.estimate,
         provenance=dict(provenance or {}),

@@ -111,7 +111,9 @@ def _write(
     file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
     if solution.strain_energy is not None:
         file["solve"].attrs["strain_energy"] = solution.strain_energy
-    write_probes(file.create_group("probes"), solution.probes)
+    probes = file.create_group("probes")
+    if solution.probes:
+        write_probes(probes, solution.probes)
     acted = file.create_group("acted")
     for key, nodes in solution.acted.items():
         acted[key] = nodes.astype(np.int32)

@@ -266,7 +266,9 @@ def _hooke_in(
         slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
     dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
     lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
-    initial = _initial_strain(solution, block, part, place).reshape(*slope.shape[:2], 6)
+    initial = np.zeros((*slope.shape[:2], 6))
+    if any(load.strains for load in solution.case.loads):
+        initial = _initial_strain(solution, block, part, place).reshape(initial.shape)
     mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
     if (mixed := solution.mean_stress.get(kind.name)) is not None:
         own = mixed[part] @ values.T

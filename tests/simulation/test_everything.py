@@ -1,6 +1,7 @@
 """What is left out where a scene does not need it changes no result: --everything agrees."""
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import fields
@@ -18,7 +19,8 @@ from solver.verification.results import read_result
 from solver.verification.run import mesh_of
 from tests.scenes import block_case, block_mesh, moved
 
-CASES = Path(__file__).parents[2] / "cases/ssnp170"
+ROOT = Path(__file__).resolve().parents[2]
+CASES = ROOT / "cases/ssnp170"
 PLANE = "abcdefghij"
 # Slaves: TETRA4, TETRA10, HEXA8, HEXA20, PENTA6 on triangles, PYRA5 on squares.
 SOLID = [("k", False), ("l", False), ("m", False), ("n", False), ("z1", True), ("z6", True)]
@@ -145,3 +147,37 @@ def test_the_command_line_does_everything(tmp_path, capsys):
     assert "no second active-set solve" in [line.what for line in short.plan]
     assert full.plan[0] == Line("everything is done", "as asked for by --everything, needed or not")
     assert max(differences(short, full)) < AGREED
+
+
+# What a feature is called in the names of functions and of files of its own.
+FEATURES = re.compile(
+    r"rigid(?!_motion|Motion)|spring|mixed|initial_strain|StrainTerm|Strains|frict|slip(?!_$)|stick"
+    r"|coulomb|cyclic|together|tied|copied|released|probe|stabilis|couple|tangential|quadric",
+    re.IGNORECASE,
+)
+# Questions whether a case has a feature; and how far surfaces slide, which every solve judges.
+GENERAL = {
+    "acting.py Load.strains",
+    "material.py Material.mixed",
+    "model.py Case.frictional",
+    "model.py Case.frictional.<locals>.<genexpr>",
+    "validity.py _slip",
+}
+
+
+def test_a_plain_case_enters_no_function_of_a_feature_that_it_lacks(tmp_path):
+    entered = set()
+
+    def watch(frame, event, _):
+        code = frame.f_code
+        if event == "call" and code.co_filename.startswith(f"{ROOT}/solver/") and code.co_flags & 2:
+            entered.add(f"{Path(code.co_filename).name} {code.co_qualname}")
+
+    sys.setprofile(watch)
+    try:
+        main(["solve", str(CASES / "e.yaml"), "-o", str(tmp_path / "result.vtkhdf"), "--quiet"])
+    finally:
+        sys.setprofile(None)
+    assert "friction.py Search.settled" not in entered
+    assert "problem.py ContactProblem.solve" in entered
+    assert {name for name in entered if FEATURES.search(name)} - GENERAL == set()

@@ -34,7 +34,7 @@ def test_the_file_lies_beside_the_case_by_the_name_of_the_solve(tmp_path):
 
 def test_accepting_writes_one_line_a_check(solution):
     lines = accept(solution, checked(solution))
-    assert "multiplier interface: none → 25 … 25" in lines
+    assert "multiplier interface: none → 25" in lines
     text = regression_file(solution).read_text()
     assert '  "displacement": {"minimum": -1.1375, "maximum": 0.24375},\n' in text
     assert '  "balance": {"minimum": 0.0, "maximum": 0.0},\n' in text
@@ -66,7 +66,7 @@ def test_a_change_fails_until_it_is_accepted_and_changes_one_line(solution):
     check = next(check for check in checked(solution) if check.name == "nodal_stress")
     assert not check.passed
     assert check.regression.change == pytest.approx(4e-6)
-    assert accept(solution, [*checked(solution)]) == ["nodal_stress: -25 … -25 → -25.0001 … -25"]
+    assert accept(solution, [*checked(solution)]) == ["nodal_stress: -25 → -25.0001 … -25"]
     after = path.read_text().splitlines()
     assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
     assert all(check.passed for check in checked(solution))
@@ -77,8 +77,8 @@ def test_a_check_that_no_longer_runs_is_dropped(tmp_path):
     accept(solution, checked(solution))
     without = plane(tmp_path, PLANE.replace("  gap: 0.0\n", ""))
     assert accept(without, checked(without)) == [
-        "element_gap interface: 0 … 0 → none",
-        "observation_gap interface: 0 … 0 → none",
+        "element_gap interface: 0 → none",
+        "observation_gap interface: 0 → none",
     ]
     assert "element_gap interface" not in accepted_values(without)
 

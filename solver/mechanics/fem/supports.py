@@ -32,11 +32,15 @@ class TieError(Exception):
 
 @dataclass(frozen=True)
 class Fixed:
-    """Imposed displacement of nodes (n,) along unit directions (n, dim), of values (n,)."""
+    """Imposed displacement of nodes (n,) along unit directions (n, dim), of values (n,).
+
+    `holder`: what holds them, by name.
+    """
 
     nodes: np.ndarray
     directions: np.ndarray
     values: np.ndarray
+    holder: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """Balance of forces and moments, reactions, and the resultants of contact in a zone."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import sparse
 
@@ -33,7 +35,8 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     by_zone = {}
     for zone in scene.zones:
         forces = zone.forces(state.pressure).reshape(points.shape)
-        by_zone[zone.zone.name] = forces, zone.couple(state.pressure)
+        apart = zone.operator.levers is not None
+        by_zone[zone.zone.name] = forces, zone.couple(state.pressure) if apart else np.zeros(3)
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
@@ -72,7 +75,7 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
     left, _ = _unbalanced(scene, state, _contact(scene, state))
     found: dict[str, np.ndarray] = {}
     spanned = np.zeros((*left.shape, left.shape[1]))
-    for key, fixed in scene.fixed.items():
+    for fixed in scene.fixed:
         nodes, direction = fixed.nodes, fixed.directions
         rest = direction - np.einsum("nij,nj->ni", spanned[nodes], direction)
         size = np.linalg.norm(rest, axis=1, keepdims=True)
@@ -81,7 +84,7 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
         part = np.einsum("nd,nd->n", left[nodes], unit)[:, None] * unit
         left[nodes] -= part
         if len(nodes):
-            force = found.setdefault(_holder(scene, key), np.zeros_like(left))
+            force = found.setdefault(fixed.holder, np.zeros_like(left))
             force[nodes] += part
     for name in ("together", "cyclic"):
         if any(getattr(support, name) for support in scene.case.supports):
@@ -126,15 +129,6 @@ def rigid_bodies(scene: Scene, state: Equilibrium) -> list[RigidMotion]:
 def _of_ground(state: Equilibrium) -> np.ndarray:
     """The forces (n, dim) on the bodies of parts that stand on the ground."""
     return -state.iterate.ground
-
-
-def _holder(scene: Scene, key: str) -> str:
-    """The group that a key of the case file holds."""
-    if key == "plane":
-        return "axis"
-    if key.startswith("supports["):
-        return scene.case.supports[int(key[len("supports[") : key.index("]")])].group
-    return key.removeprefix("bodies.").rpartition(".")[0]
 
 
 def _resultant(scene: Scene, name: str, force: np.ndarray) -> Reaction:
@@ -216,7 +210,7 @@ def pressures_of_forces(scene: Scene, state: Equilibrium) -> list[np.ndarray | N
     if not determined.all():
         return nothing
     known = (state.force + state.correction).ravel()
-    for zone in scene.zones:
+    for zone in (zone for zone in scene.zones if zone.slips):
         known = known + zone.tangential_forces(state.pressure)
     forces = rows @ (state.iterate.internal.ravel() - known).astype(float)
     matrix = integrals.T @ integrals + sparse.diags_array((size == 0).astype(float))
@@ -270,32 +264,34 @@ def resultants(
         forces = forces + field.force
     nodes = surface_nodes(zone.sub_faces)
     force = forces.reshape(scene.points.shape)[nodes]
-    return Resultants(
+    found = Resultants(
         area=area,
         force=force.sum(axis=0),
         moment=moment(scene, nodes, force),
         edges=edges,
         pressure=np.array([mean.min(), mean.max()]),
-        **_friction_resultants(scene, zone, state, mean, nodes),
     )
+    if not zone.slips or state.friction is None:
+        return found
+    friction, stick = _friction_resultants(scene, zone, state, mean, nodes)
+    return replace(found, friction=friction, stick=stick)
 
 
 def _friction_resultants(
     scene: Scene, zone: ZoneScene, state: Equilibrium, mean: np.ndarray, nodes: np.ndarray
-) -> dict[str, np.ndarray]:
-    """The force of friction on the slave, and the area that sticks; nothing without friction.
+) -> tuple[np.ndarray, np.ndarray]:
+    """The force (dim,) of friction on the slave, and the area (3,) that sticks.
 
     What the traction leaves of the bound, μp − |q|, ends where slip begins, as a pressure ends
     where contact does: the edge of the sticking area is found in the same way.
     """
-    if not zone.slips or state.friction is None:
-        return {}
+    assert state.friction is not None
     forces = zone.tangential_forces(state.pressure).reshape(scene.points.shape)
     traction = np.linalg.norm([state.pressure[rows] for rows in zone.slips], axis=0)
     sticks = state.status.closed[zone.numbers] & ~state.friction.slipping[zone.numbers]
     rest = np.where(sticks, zone.zone.friction * mean - traction, 0.0)
     _, area = _extent(scene, zone, rest, sticks)
-    return {"friction": forces[nodes].sum(axis=0), "stick": area}
+    return forces[nodes].sum(axis=0), area
 
 
 def _extent(

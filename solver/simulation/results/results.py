@@ -88,7 +88,7 @@ def solution_of(
         plan=plan,
         strain_energy=strain_energy(last),
         reaction=at_nodes,
-        probes=probed(scene, zones, last.displacement, stress),
+        probes=probed(scene, zones, last.displacement, stress) if scene.case.probes else {},
         acted=scene.acted,
         accuracy=last.accuracy.causes,
         mean_stress=mean_stress,
@@ -166,7 +166,7 @@ def _zone_result(
         pressure_error=None if field is None else field.error,
         recovered=_recovered_pressure(scene, zone, state, field),
         resultants=step.resultants[zone.zone.name],
-        friction=zone_friction(zone, state, field),
+        friction=zone_friction(zone, state, field) if zone.slips and state.friction else None,
     )
 
 
@@ -253,7 +253,7 @@ def step_results(
                     for zone in scene.zones
                 },
                 reactions=held,
-                rigid=rigid_bodies(scene, state),
+                rigid=rigid_bodies(scene, state) if scene.rigid else [],
                 dissipation=state.friction.dissipation if state.friction else 0.0,
             )
         )
@@ -280,12 +280,9 @@ def stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) ->
     return max(values, default=0.0) or float(max(largest)) or 1.0
 
 
-def zone_friction(
-    zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
-) -> ZoneFriction | None:
-    """Traction, slip and status of a zone; None without friction."""
-    if not zone.slips or state.friction is None:
-        return None
+def zone_friction(zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None) -> ZoneFriction:
+    """Traction, slip and status of a zone."""
+    assert state.friction is not None
     tangents = tangents_of(zone.operator.surface.normal)
 
     def in_space(values: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,27 +14,20 @@ from ...case.expressions import Exact
 from ...case.material import Material
 from ...case.solutions.base import ExactSolution
 from ...lac.cells.catalogue import BY_NAME
-from ...lac.cells.faces import FaceBlock, nodal_normals
+from ...lac.cells.faces import FaceBlock
 from ...lac.cells.shape import has_straight_edges
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.elasticity import lame_parameters
 from ...mechanics.fem.loads import body_forces, face_forces, stress_forces
-from ...mechanics.fem.supports import (
-    CopyError,
-    Fixed,
-    FreeMotion,
-    SupportClashError,
-    TieError,
-    copied,
-    free_motion,
-    released,
-    tied,
-)
+from ...mechanics.fem.supports import Fixed, FreeMotion, SupportClashError, free_motion
 from ...system.errors import InputError
-from . import rigid
-from .cut_groups import CutGroups, copies_of, ties_of
+from .cut_groups import CutGroups
 from .groups import ALL
-from .rigid import Frame
+from .holdings import holdings_of
+from .holdings.holding import Holding
+
+if TYPE_CHECKING:
+    from .holdings.rigid import Frame
 
 
 class Attributes(CutGroups):
@@ -64,7 +58,7 @@ class Attributes(CutGroups):
         """
         young = self.by_material(lambda m: m.young, 1.0)
         poisson = self.by_material(lambda m: m.poisson, 0.0)
-        moving = rigid.moving_nodes(self, self.frames)
+        moving = [holding.moving for holding in self.holdings if holding.moving is not None]
         blocks = [
             Block(
                 BY_NAME[name],
@@ -76,8 +70,8 @@ class Attributes(CutGroups):
             )
             for name, cells in self.cut.cells.items()
         ]
-        if moving.any():
-            blocks = [block.of(~moving[block.cells].all(axis=1)) for block in blocks]
+        for nodes in moving:
+            blocks = [block.of(~nodes[block.cells].all(axis=1)) for block in blocks]
         return [block for block in blocks if len(block.cells)]
 
     def by_material(
@@ -111,66 +105,53 @@ class Attributes(CutGroups):
         return found
 
     @cached_property
+    def holdings(self) -> list[Holding]:
+        """What holds and joins the bodies."""
+        return holdings_of(self)
+
     def frames(self) -> dict[str, Frame]:
         """The rigid bodies by name."""
-        return rigid.frames_of(self)
+        return {name: f for holding in self.holdings for name, f in holding.frames.items()}
 
-    @cached_property
-    def fixed(self) -> dict[str, Fixed]:
-        """What the axis, supports and rigid bodies hold, by the key of the case file."""
-        fixed = dict(self._fixed())
-        rigid.refuse_moved(self.case, self.frames, fixed)
-        dim = self.points.shape[1]
-        on_axis = np.flatnonzero(self.points[:, 0] == 0) if self.axisymmetric else np.empty(0, int)
-        # The circles of points on the axis have no radius, and keep it.
-        held = Fixed(on_axis, np.tile(np.eye(dim)[0], (len(on_axis), 1)), np.zeros(len(on_axis)))
-        return {"plane": held, **fixed, **rigid.held(self.case, self.frames)}
+    def fixed(self, name: str | None = None) -> dict[str, Fixed]:
+        """What holdings fix, by the key of the case file; without values of other names."""
+        found: dict[str, Fixed] = {}
+        for holding in self.holdings:
+            found |= holding.fixed(found, name)
+        return found
 
-    def supports(self) -> FreeMotion:
-        """The motion that supports and rigid bodies leave free."""
-        ties, copies = ties_of(self), copies_of(self)
+    def supports(self, name: str | None = None) -> FreeMotion:
+        """The motion that holdings leave free, with the displacements imposed by all or a `name`.
+
+        Raises InputError where two of them do not go together.
+        """
+        fixed = self.fixed(name)
         try:
-            free = free_motion(len(self.points), self.points.shape[1], list(self.fixed.values()))
-            free = tied(copied(free, list(copies.values())), list(ties.values()))
-            return released(free, rigid.free_motions(self, self.frames))
-        except CopyError as error:
-            key = list(copies)[error.number]
-            raise InputError(self.case.path, key, None, str(error)) from None
-        except TieError as error:
-            raise InputError(self.case.path, list(ties)[error.number], None, str(error)) from None
+            free = free_motion(len(self.points), self.points.shape[1], list(fixed.values()))
         except SupportClashError as clash:
-            key = list(self.fixed)[clash.number]
-            remark = " (on the axis x is fixed)" if len(self.fixed["plane"].nodes) else ""
+            remark = "" if name is None else ", of another name in steps"
+            if "plane" in fixed and name is None and len(fixed["plane"].nodes):
+                remark = " (on the axis x is fixed)"
+            key = list(fixed)[clash.number]
             raise InputError(self.case.path, key, clash.value, f"{clash}{remark}") from None
+        for holding in self.holdings:
+            free = holding.link(free)
+        return free
 
-    def _fixed(self) -> Iterator[tuple[str, Fixed]]:
-        """The displacements fixed by supports, by key of the case file."""
-        for i, support in enumerate(self.case.supports):
-            nodes = self.nodes(support.group, f"supports[{i}].group")
-            for direction, value in support.fix.items():
-                key = f"supports[{i}].fix.{direction}"
-                if direction == "normal":
-                    directions = self._normals(support.group, nodes, key)
-                else:
-                    axis = np.eye(self.points.shape[1])["xyz".index(direction)]
-                    directions = np.tile(axis, (len(nodes), 1))
-                if isinstance(value, Exact):
-                    place = self.points[nodes] + self.origin
-                    whole = self._exact.displacement(place, self.exact_part[nodes])
-                    values = np.einsum("nd,nd->n", whole, directions)
-                else:
-                    values = self.field(value)(self.points[nodes])
-                yield key, Fixed(nodes, directions, values)
+    def exact_displacement(self, nodes: np.ndarray) -> np.ndarray:
+        """The displacement (k, dim) of the case's exact solution at nodes (k,)."""
+        place = self.points[nodes] + self.origin
+        return self._exact.displacement(place, self.exact_part[nodes])
 
-    def _normals(self, group: str, nodes: np.ndarray, key: str) -> np.ndarray:
-        """Unit normals (n, dim) of a group's faces at its nodes, the mean over the faces there."""
-        return nodal_normals(self.points, self.faces(group, key))[nodes]
+    def forces(self, name: str | None = None) -> np.ndarray:
+        """Nodal forces (n, dim) of all loads, or those of a `name`, at load factor 1.
 
-    def forces(self) -> np.ndarray:
-        """Nodal forces (n, dim) of all loads but initial strains, at load factor 1."""
-        total = rigid.forces(self, self.frames)
+        Those of parts, such as initial strain, are not among them.
+        """
+        total = sum((holding.force(name) for holding in self.holdings), np.zeros_like(self.points))
         for i, load in enumerate(self.case.loads):
-            total += self._force(load, f"loads[{i}].group")
+            if name in (None, load.name):
+                total += self._force(load, f"loads[{i}].group")
         return total
 
     def histories(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -187,24 +168,7 @@ class Attributes(CutGroups):
         return then.forces(), then.supports().offset
 
     def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        mine = [f"supports[{i}]." for i, s in enumerate(self.case.supports) if s.name == name]
-        mine += [f"bodies.{group}." for group, b in self.case.rigid.items() if b.name == name]
-        fixed = {
-            key: replace(f, values=f.values * key.startswith(tuple(mine)))
-            for key, f in self.fixed.items()
-        }
-        force = rigid.forces(self, self.frames, name)
-        for i, load in enumerate(self.case.loads):
-            if load.name == name:
-                force += self._force(load, f"loads[{i}].group")
-        try:
-            free = free_motion(len(self.points), self.points.shape[1], list(fixed.values()))
-            free = copied(free, list(copies_of(self).values()))
-        except SupportClashError as clash:
-            allowed = f"{clash}, of another name in steps"
-            key = list(fixed)[clash.number]
-            raise InputError(self.case.path, key, clash.value, allowed) from None
-        return force, free.offset
+        return self.forces(name), self.supports(name).offset
 
     def _force(self, load: Load, key: str) -> np.ndarray:
         total = np.zeros_like(self.points)

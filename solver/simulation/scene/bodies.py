@@ -51,12 +51,12 @@ _DEEPEST = 0.1
 def check_geometry(scene: Scene) -> None:
     """Raise `InputError` for the first thing that makes no sense."""
     for i, zone in enumerate(scene.zones):
-        _refuse_mixed_groups(scene, i, zone)
+        _refuse_groups(scene, i, zone)
         _refuse_deep_overlap(scene, i, zone)
     _refuse_unmerged(scene)
 
 
-def _refuse_mixed_groups(scene: Scene, i: int, zone: ZoneScene) -> None:
+def _refuse_groups(scene: Scene, i: int, zone: ZoneScene) -> None:
     """A group on several bodies, one of which is on the other side too, was picked by mistake."""
     bodies = {side: _bodies(scene, getattr(zone, f"{side}_faces")) for side in ("slave", "master")}
     common = bodies["slave"] & bodies["master"]

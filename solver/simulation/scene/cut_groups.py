@@ -12,7 +12,6 @@ from typing import TypeAlias
 
 import meshio
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ...case.acting import Scalar
 from ...case.expressions import evaluate
@@ -25,9 +24,7 @@ from ...lac.facets import facets
 from ...lac.motions import body_numbers
 from ...mechanics.fem.faces import FaceError, boundary_faces, volume_cells
 from ...mechanics.fem.loads import Field
-from ...mechanics.fem.supports import Copies
 from ...mechanics.mortar.treatments import TREATMENTS
-from ...mesh.transforms import rotation
 from ...system.errors import InputError
 from .groups import ALL
 
@@ -215,52 +212,6 @@ def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock
                 "pressure has no force at the node there; allowed there: lac, quadrature, nodal"
             )
             raise InputError(case.path, f"contact[{i}].treatment", zone.treatment, allowed)
-
-
-# Nodes are copies where they are nearer to the image than this share of the model's extent.
-_NEAR = 1e-6
-
-
-def ties_of(groups: CutGroups) -> dict[str, np.ndarray]:
-    """The degrees of freedom (n,) of nodes that move as one, by key of the case file."""
-    found: dict[str, np.ndarray] = {}
-    dim = groups.points.shape[1]
-    for i, support in enumerate(groups.case.supports):
-        if not support.together:
-            continue
-        key = f"supports[{i}].group"
-        nodes = groups.nodes(support.group, key)
-        if np.ptp(groups.body[nodes]):
-            allowed = "its nodes belong to several bodies; only one body is tied"
-            raise InputError(groups.case.path, key, support.group, allowed)
-        for direction in support.together:
-            found[f"supports[{i}].together.{direction}"] = dim * nodes + "xyz".index(direction)
-    return found
-
-
-def copies_of(groups: CutGroups) -> dict[str, Copies]:
-    """Nodes that move as another side's nodes do, by key of the case file."""
-    found: dict[str, Copies] = {}
-    points, dim = groups.points + groups.origin, groups.points.shape[1]
-    extent = float(np.ptp(points, axis=0).max())
-    for i, support in enumerate(groups.case.supports):
-        if (given := support.cyclic) is None:
-            continue
-        key = f"supports[{i}].cyclic"
-        of, copy = groups.nodes(given.of, f"{key}.of"), groups.nodes(support.group, key)
-        turn = rotation(dim, given.angle or 0.0, given.axis)
-        image = points[of] @ turn.T + (given.shift or np.zeros(dim))
-        # Both surfaces of an interface are at the same place: bodies are apart by a further axis.
-        apart = [np.c_[x, extent * groups.body[n]] for x, n in ((image, of), (points[copy], copy))]
-        distance, nearest = cKDTree(apart[1]).query(apart[0])
-        lost = np.flatnonzero(distance > _NEAR * extent)
-        if len(lost) or len(of) != len(copy):
-            at = ", ".join(f"{x:.6g}" for x in image[lost[0]]) if len(lost) else ""
-            allowed = f"{len(of)} nodes have {len(copy)} copies"
-            allowed += f"; no copy is at ({at}), of the same body" if at else ""
-            raise InputError(groups.case.path, key, support.group, allowed)
-        found[key] = Copies(of, copy[nearest], turn)
-    return found
 
 
 def refuse_bent(case: Case, points: np.ndarray, surfaces: Surfaces) -> None:

@@ -44,7 +44,8 @@ def check_groups(case: Case, mesh: meshio.Mesh) -> None:
     for i, zone in enumerate(case.zones):
         groups.check_zone(i, zone)
     groups.check_loads()
-    groups.check_probes()
+    if case.probes:
+        groups.check_probes()
 
 
 def _refuse_beyond_axis(case: Case, points: np.ndarray) -> None:
@@ -102,6 +103,28 @@ def nodes_of_volumes(mesh: meshio.Mesh, group: str | None = None) -> np.ndarray:
             data = block.data if members is None else block.data[np.asarray(members[i], int)]
             touched[data.ravel()] = True
     return touched
+
+
+def without_loose(mesh: meshio.Mesh, attached: np.ndarray) -> meshio.Mesh:
+    """The mesh with the nodes `attached` (n,) to volume cells, and no faces and edges on others."""
+    new = np.cumsum(attached) - 1
+    kept = [attached[block.data].all(axis=1) for block in mesh.cells]
+    place = [np.cumsum(k) - 1 for k in kept]
+    sets = {
+        name: [at[i[k[i]]] for i, k, at in zip(members_of(parts), kept, place, strict=True)]
+        for name, parts in mesh.cell_sets.items()
+    }
+    return meshio.Mesh(
+        mesh.points[attached],
+        [(block.type, new[block.data[k]]) for block, k in zip(mesh.cells, kept, strict=True)],
+        point_sets={name: new[i[attached[i]]] for name, i in mesh.point_sets.items()},
+        cell_sets=sets,
+    )
+
+
+def members_of(parts: Iterable[np.ndarray]) -> list[np.ndarray]:
+    """The cells of a group by block, as numbers."""
+    return [np.asarray(part, dtype=int) for part in parts]
 
 
 def _named(case: Case) -> set[str]:

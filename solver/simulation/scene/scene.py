@@ -25,10 +25,10 @@ from ..options import LEAN, Options
 from .attributes import Attributes
 from .cut_groups import CutZone, Surfaces, refuse_bent, surfaces_of
 from .groups import ON_AXIS, check_groups, named_parts
+from .holdings.rigid import Frame
 from .operators import operator_of, with_contact_frames
 from .parts import parts_of
 from .parts.part import ModelPart
-from .rigid import Frame
 from .selections import with_groups
 
 # An average initial gap below this many roundings of the coordinates is zero.
@@ -77,8 +77,8 @@ class ZoneScene:
 
     def forces(self, values: np.ndarray) -> np.ndarray:
         """The contact forces (n_dofs,) of all rows (k,), those of tractions included."""
-        found = self.operator.matrix.T @ values[self.numbers] + self.tangential_forces(values)
-        return np.asarray(found)
+        found = np.asarray(self.operator.matrix.T @ values[self.numbers])
+        return found + self.tangential_forces(values) if self.slips else found
 
     def tangential_forces(self, values: np.ndarray) -> np.ndarray:
         """Those of the tractions alone."""
@@ -89,8 +89,7 @@ class ZoneScene:
 
     def couple(self, values: np.ndarray) -> np.ndarray:
         """The couple (3,) of tractions on surfaces that are meshed apart."""
-        if self.operator.levers is None:
-            return np.zeros(3)
+        assert self.operator.levers is not None
         pairs = zip(self.operator.levers, self.slips, strict=True)
         return np.sum([values[rows] @ lever[:, 0] for lever, rows in pairs], axis=0)
 
@@ -133,10 +132,9 @@ class Scene:
     origin of the coordinates, differences would lose digits. `length` is the largest extent of the
     mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
     cut, `body` (n,) the body of each node. `blocks` are the elastic cells, `parts` what there is
-    beside them. `fixed`: the displacements that are held, by key of the case file, `rigid`: the
-    rigid bodies. `probed`: nodes by probe; `acted`: nodes by the key of the support, or of the load
-    on a surface. `force` (n, dim), all but that of `parts`, and `free.offset` are for load factor
-    1.
+    beside them. `fixed`: the displacements that are held, `rigid`: the rigid bodies. `probed`:
+    nodes by probe; `acted`: nodes by the key of the support, or of the load on a surface. `force`
+    (n, dim), all but that of `parts`, and `free.offset` are for load factor 1.
     """
 
     case: Case
@@ -150,7 +148,7 @@ class Scene:
     body: np.ndarray
     blocks: list[Block]
     parts: tuple[ModelPart, ...]
-    fixed: dict[str, Fixed]
+    fixed: list[Fixed]
     rigid: dict[str, Frame]
     free: FreeMotion
     force: np.ndarray
@@ -257,8 +255,8 @@ def build_scene(
         body=groups.body,
         blocks=blocks,
         parts=parts,
-        fixed=groups.fixed,
-        rigid=groups.frames,
+        fixed=list(groups.fixed().values()),
+        rigid=groups.frames(),
         free=free,
         force=force,
         probed={n: groups.nodes(p.group, "probes") for n, p in case.probes.items() if p.group},
@@ -304,7 +302,7 @@ def _zones(
             )
         )
         first += len(operator.initial)
-    return _with_slips(found, first)
+    return _with_slips(found, first) if any(o.slip for o in operators) else found
 
 
 def _with_slips(zones: list[ZoneScene], first: int) -> list[ZoneScene]:

@@ -13,8 +13,7 @@ from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import outer_faces
 from ...mechanics.fem.faces import volume_cells
 from ...system.errors import InputError, hint
-from .groups import ALL, nodes_of_volumes, with_cells
-from .rigid import with_rigid_surfaces
+from .groups import ALL, nodes_of_volumes, with_cells, without_loose
 
 # A node is at a place where it is nearer than this share of the mesh's extent.
 _NEAR = 1e-6
@@ -26,8 +25,17 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
     Raises InputError where one is empty.
     """
     check_dimension(case, mesh.points.shape[1])
-    if not case.selections:
-        return with_rigid_surfaces(case, mesh)
+    if case.selections:
+        mesh = _with_selections(case, mesh)
+    attached = nodes_of_volumes(mesh)
+    if case.rigid:
+        from .holdings.rigid_surfaces import with_rigid_surfaces
+
+        mesh = with_rigid_surfaces(case, mesh, attached)
+    return mesh if attached.all() else without_loose(mesh, nodes_of_volumes(mesh))
+
+
+def _with_selections(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
     mesh = meshio.Mesh(
         mesh.points,
         [(block.type, block.data) for block in mesh.cells],
@@ -43,8 +51,7 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
             raise InputError(case.path, selection.key, selection.name, allowed)
         _add(case, mesh, selection)
     mesh.cell_sets.pop(_OUTER, None)
-    mesh = with_cells(mesh, [np.arange(len(b.data)) < given.get(b.type, 0) for b in mesh.cells])
-    return with_rigid_surfaces(case, mesh)
+    return with_cells(mesh, [np.arange(len(b.data)) < given.get(b.type, 0) for b in mesh.cells])
 
 
 def _add(case: Case, mesh: meshio.Mesh, selection: Selection) -> None:

@@ -1,0 +1,42 @@
+"""Nodes that move as one along an axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....mechanics.fem.supports import FreeMotion, TieError, tied
+from ....system.errors import InputError
+from ..cut_groups import CutGroups
+from .holding import Holding
+
+
+class Together(Holding):
+    """The ties of a case."""
+
+    def __init__(self, groups: CutGroups):
+        self._case, self._ties = groups.case, ties_of(groups)
+
+    def link(self, free: FreeMotion) -> FreeMotion:
+        """Their nodes have one displacement; InputError where they are not free for it."""
+        try:
+            return tied(free, list(self._ties.values()))
+        except TieError as error:
+            key = list(self._ties)[error.number]
+            raise InputError(self._case.path, key, None, str(error)) from None
+
+
+def ties_of(groups: CutGroups) -> dict[str, np.ndarray]:
+    """The degrees of freedom (n,) of nodes that move as one, by key of the case file."""
+    found: dict[str, np.ndarray] = {}
+    dim = groups.points.shape[1]
+    for i, support in enumerate(groups.case.supports):
+        if not support.together:
+            continue
+        key = f"supports[{i}].group"
+        nodes = groups.nodes(support.group, key)
+        if np.ptp(groups.body[nodes]):
+            allowed = "its nodes belong to several bodies; only one body is tied"
+            raise InputError(groups.case.path, key, support.group, allowed)
+        for direction in support.together:
+            found[f"supports[{i}].together.{direction}"] = dim * nodes + "xyz".index(direction)
+    return found
