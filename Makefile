@@ -47,7 +47,7 @@ if test $$status = 0; then \
 fi; exit $$status
 endef
 
-.PHONY: help all-cases family case report pictures summary compare bench orders study
+.PHONY: help all-cases family case report pictures recorded summary compare bench orders study
 .PHONY: stability infsup scaling benchmark converge test accept
 .PHONY: format lint lock schemas faults mutants kills cluster-test docs bill clean clean-all
 .PHONY: environment code-environment test-environment lint-environment docs-environment
@@ -77,6 +77,9 @@ report: environment ## write the report again from existing results
 
 pictures: environment ## draw the README's pictures from the last batch
 	@.venv/bin/python docs/site/front.py
+
+recorded: environment ## keep the results of make study and make stability for the first screen
+	@.venv/bin/python docs/site/recorded.py
 
 summary: ## print the last report's table, as Markdown
 	@cat results/report/summary.md 2>/dev/null \

@@ -48,7 +48,7 @@ def write_report(
         "junit.xml": to_junit([row for row in rows if not row.verdict.code]),
         "failures.txt": tables.to_failures([row for row in asked if not row.verdict.code]),
     }
-    contents |= {part.page: family_page(part, folder) for part in parts}
+    contents |= {part.page: family_page(part, folder, parts) for part in parts}
     for name, content in contents.items():
         write_text(folder / name, content)
     write_script(folder)

@@ -33,8 +33,11 @@ EPSILON = float(np.finfo(float).eps)
 INK, MUTED, PAPER, FLOOR = "#1f2933", "#66727f", "#ffffff", "#e6eaee"
 # Colours that colour-blind readers can distinguish (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE = "#0072b2", "#d55e00", "#009e73", "#c1121f", "#aa5588"
-CROSS = "M-1,-1L1,1M1,-1L-1,1"
+# A cross with a surface: marks without lines are filled, and have no stroke.
+CROSS = "M-1,-.6L-.6,-1L0,-.4L.6,-1L1,-.6L.4,0L1,.6L.6,1L0,.4L-.6,1L-1,.6L-.4,0Z"
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
+# The fewest digits kept that have a colour: dark is good, bad is told by its hue.
+KEPT_DIGITS = {12: "#0b5d57", 10: "#1d7a74", 8: "#3f8f8a", 6: "#9cc7b8", 4: "#f3d28b", 0: "#e8794b"}
 # Digits of a number in a page.
 DIGITS = 10
 # The values of a mark under the pointer: powers of ten as 1.2e-10.

@@ -93,7 +93,7 @@ def against_time(
     return series_chart(
         "error-against-time",
         "Worst error of every solve against its run time",
-        records,
+        sorted(records, key=lambda record: record["series"] == "not passed"),  # on top
         Axis("seconds", "wall time of the solve, s", log=True),
         Axis("error", "worst relative error", log=True, domain=domain),
         {name: look for name, look in LOOKS.items() if name in found},

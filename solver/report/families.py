@@ -16,6 +16,8 @@ figures:                       # the solves whose pressure is drawn along the in
   - {job: block-hexa8, along: sqrt(x**2 + y**2), caption: what to look at}
 reference_code:                # another code's own errors, drawn beside the solves' errors
   - {name: code_aster, version: "14.6", error: 4.0e-13, remark: most cases}
+  - {name: code_aster, version: "14.6", error: 2.4e-9, slave: [HEXA8],
+     remark: on other cells}
 """
 
 import math
@@ -54,12 +56,20 @@ class Figure(Section, frozen=True):
 
 
 class CodeError(Section, frozen=True):
-    """Another code's own error."""
+    """Another code's own error.
+
+    Of solves with `slave` cells of these types on other cells; of all others where none is named.
+    """
 
     name: str
     version: Version
     error: Positive
     remark: str = ""
+    slave: tuple[str, ...] = ()
+
+    def applies(self, slave: set[str], master: set[str]) -> bool:
+        """Whether it is the error of a solve with these cell types."""
+        return not self.slave or (slave <= set(self.slave) and slave != master)
 
 
 class FamilyFile(Section, frozen=True):

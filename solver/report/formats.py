@@ -30,6 +30,13 @@ def error(value: float | None) -> str:
     return NOTHING if value is None or math.isnan(value) else "0" if value == 0 else f"{value:.1e}"
 
 
+def percent(value: float | None) -> str:
+    """A relative error as people say it: percent from 0.01 % on, a power of ten below."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    return f"{100 * value:.2g} %" if value >= 1e-4 else error(value)
+
+
 def extremes(pair: Sequence[float | None] | None, scale: float | None = None) -> str:
     """Minimum … maximum; one number where both show alike; zero for round-off of `scale`."""
     return " … ".join(both(pair, scale))
@@ -40,6 +47,13 @@ def both(pair: Sequence[float | None] | None, scale: float | None = None) -> lis
     if not pair:
         return [NOTHING]
     return list(dict.fromkeys(_near_zero(value, scale) for value in pair))
+
+
+def near(value: float | None, scale: float | None) -> str:
+    """Six digits, and zero for round-off of `scale`."""
+    if value is None or math.isnan(value):
+        return NOTHING
+    return "0" if scale and abs(value) < ROUND_OFF * scale else f"{value + 0.0:.6g}"
 
 
 def _near_zero(value: float | None, scale: float | None) -> str:
@@ -152,6 +166,32 @@ KINDS = {
 
 
 PAGE = "summary.html"
+# Pages beside the report that other commands write, with what they are called.
+PAGES = {
+    "study": "error against run time",
+    "stability": "numerical stability",
+    "scaling": "scaling",
+    "infsup": "inf-sup test",
+    "benchmark": "time ratios",
+    "pairs": "every pair of options",
+    "bench": "other codes",
+    "compare": "comparison",
+}
+# Where `make docs` writes the documentation, from the folder of a report.
+DOCS = "../docs/index.html"
+
+
+def menu(folder: Path, families: Mapping[str, str] | None = None) -> dict[str, dict[str, str]]:
+    """The pages in `folder` by group and title: families, studies and comparisons, docs."""
+    pages = {title: f"{name}.html" for name, title in PAGES.items()}
+    pages |= {f"{title} (a part)": f"{name}-quick.html" for name, title in PAGES.items()}
+    there = {words: file for words, file in pages.items() if (folder / file).is_file()}
+    found = {"Families": dict(families or {"all families": f"{PAGE}#families"})}
+    found["Studies and comparisons"] = there
+    found["Documentation"] = {"documentation": DOCS} if (folder / DOCS).is_file() else {}
+    return {group: pages for group, pages in found.items() if pages}
+
+
 TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -172,6 +212,7 @@ def environment(*folders: Path) -> Environment:
     )
     templates.filters |= {
         "error": error,
+        "percent": percent,
         "number": number,
         "seconds": seconds,
         "duration": duration,

@@ -3,7 +3,6 @@
 The first screen has how well, error against run time, digits kept, work left out.
 """
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ..case.checks import BY_NAME, ERRORS
-from ..verification.savings import Savings, read_savings
-from . import formats
+from . import cards, formats
+from .cards import WORK, left_out_by_family
 from .charts import (
     BLUE,
     EPSILON,
@@ -22,16 +21,14 @@ from .charts import (
     Axis,
     Chart,
     Look,
-    Spec,
     floor_band,
     level,
     series_chart,
-    tooltip,
 )
 from .errors import address, against_time, drawn, mark, unknowns
 from .formats import TEMPLATES, render
 from .pictures import VIEWER, picture, profile
-from .rows import Row, causes, choices, families, ours
+from .rows import Row, causes, choices, ours
 from .sections import FamilySection, grouped
 from .tables import outcome
 
@@ -50,12 +47,6 @@ CAUSES = {
     "slender": "small faces of slender cells",
     "sums": "cells with many nodes",
 }
-# What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
-WORK = {
-    "quadrature": "more Gauss points",
-    "unloaded": "bodies that nothing moves",
-    "status": "further solves",
-}
 
 
 def in_words(rows: Sequence[Row]) -> str:
@@ -67,9 +58,10 @@ def in_words(rows: Sequence[Row]) -> str:
         ("stated tolerance", "{} keep a stated tolerance, with errors up to {}"),
     ):
         mine = [row for row in ours(rows) if row.sound and row.verdict.judged == judged]
-        errors = [row.accuracy[0] for row in mine if row.accuracy]
-        if errors:
-            said.append(text.format(len(mine), formats.error(max(errors))))
+        if errors := [row.accuracy for row in mine if row.accuracy]:
+            worst, check = max(errors)
+            words = f"{formats.percent(worst)} ({check.replace('_', ' ')})"
+            said.append(text.format(len(mine), words))
     types = {name for row in ours(rows) for body in row.sides for name in body.cells}
     on = f" on {len(types)} cell types" if types else ""
     return f"Of {len(ours(rows))} solves{on}, {'; '.join(said)}." if said else ""
@@ -134,35 +126,6 @@ def digit_chart(rows: Sequence[Row]) -> Chart | None:
     )
 
 
-def extreme_cases(folder: Path) -> Chart | None:
-    """The digits of the pressure in each stiff or extreme case, where the study is in `folder`."""
-    file = folder / "stability.csv"
-    if not file.is_file():
-        return None
-    with file.open(encoding="utf-8", newline="") as stream:
-        points = [point for point in csv.DictReader(stream) if point["pressure"]]
-    records = [
-        {
-            "quantity": point["group"].replace("-", " "),
-            "digits": _digits(float(point["pressure"])),
-            "mesh": point["line"],
-            "value": point["labels_x"],
-            "url": f"stability.html#map-{point['group']}",
-        }
-        for point in points
-    ]
-    titles = {"quantity": "varied", "value": "value", "mesh": "mesh", "digits": "digits kept"}
-    names: Spec = {"field": "quantity", "type": "nominal", "sort": None, "title": None}
-    x = Axis("digits", "digits of the pressure", domain=_SHOWN).channel()
-    marks = {"type": "tick", "thickness": 2, "color": BLUE, "cursor": "pointer"}
-    channels: Spec = {"x": x, "y": names | {"axis": {"labelLimit": 260, "grid": True}}}
-    channels |= {"href": {"field": "url"}, "tooltip": tooltip(records, titles)}
-    height = 15 * len({record["quantity"] for record in records})
-    spec = {"width": 420, "height": height, "data": {"values": records}, "mark": marks}
-    spec |= {"encoding": channels}
-    return Chart("extreme-cases", "Digits in stiff and extreme cases", spec, 700)
-
-
 def digits_kept(row: Row) -> float:
     """How many decimal digits rounding leaves in the pressure, by the estimate of the solve."""
     return _digits(row.verdict.attainable or 1.0)
@@ -184,41 +147,13 @@ def fewest_digits(rows: Sequence[Row]) -> list[Row]:
     return sorted(known, key=lambda row: (digits_kept(row), row.anchor))[:_WORST]
 
 
-def left_out_by_family(
-    rows: Sequence[Row], folder: Path
-) -> dict[str, tuple[int, list[int], Savings | None]]:
-    """By family: how many solves, how many of them left out each kind of `WORK`, time saved.
-
-    The times are in `folder`, that of the report.
-    """
-    found: dict[str, tuple[int, list[int], Savings | None]] = {}
-    solved = [row for row in ours(rows) if row.verdict.dofs]
-    for family, mine in families(solved).items():
-        counts = [sum(switch in row.verdict.switches for row in mine) for switch in WORK]
-        found[family] = len(mine), counts, read_savings(folder / "saved" / f"{family}.json")
-    return found
-
-
 def _pick(field: str, names: Sequence[str]) -> dict[str, object]:
     """A list above the chart from which one value of a field is chosen."""
     choice = {"input": "select", "options": ["", *names], "labels": ["all", *names]}
     return {"name": f"pick_{field}", "value": "", "bind": choice | {"name": f"{field}: "}}
 
 
-# Pages beside the report that other commands write.
-_PAGES = {
-    "study": "error against run time, LAC and other treatments",
-    "stability": "numerical stability",
-    "scaling": "scaling",
-    "infsup": "inf-sup test",
-    "benchmark": "time ratios",
-    "pairs": "every pair of options",
-    "bench": "other codes on the same cases",
-    "compare": "comparison with another batch",
-}
 _TABLES = {"JSON": "summary.json", "CSV": "summary.csv", "Markdown": "summary.md"}
-# Where `make docs` writes the documentation, from the folder of a report.
-_DOCS = "../docs/index.html"
 
 
 def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
@@ -233,13 +168,14 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         rows=rows,
         charts=True,
         links=_links(folder),
+        menu=_menu(sections, folder),
+        cards=cards.of(sections, folder),
         bad=bad,
         causes=causes(bad),
         choices=choices(rows),
         verified=in_words(rows),
         errors=error_chart(ours(rows)),
         digits=digit_chart(rows),
-        extremes=extreme_cases(folder),
         fewest=fewest_digits(rows),
         digits_kept=digits_kept,
         cause=cause,
@@ -255,12 +191,19 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     )
 
 
-def family_page(section: FamilySection, folder: Path) -> str:
-    """The page of a family: problem, reference, figures, its solves case by case."""
+def _menu(sections: Sequence[FamilySection], folder: Path) -> dict[str, dict[str, str]]:
+    return formats.menu(folder, {one.family.title: one.page for one in sections})
+
+
+def family_page(
+    section: FamilySection, folder: Path, sections: Sequence[FamilySection] = ()
+) -> str:
+    """The page of a family: its solves, problem, reference, figures, each solve in a panel."""
     return render(
         TEMPLATES / "family.html.jinja",
         title=section.family.title,
         charts=True,
+        menu=_menu(sections or [section], folder),
         viewer_script=VIEWER,
         sortable=True,
         outcome=section.outcome,
@@ -285,10 +228,9 @@ def _pressure(row: Row, pictures: Path) -> Chart | str:
 
 def _links(folder: Path) -> dict[str, str]:
     """Tables beside the report, the documentation, and pages of other commands that are there."""
-    pages = {title: f"{name}.html" for name, title in _PAGES.items()}
-    there = {"Documentation": _DOCS} | pages
-    found = {title: target for title, target in there.items() if (folder / target).is_file()}
-    return _TABLES | {"JUnit": "junit.xml"} | found
+    pages = formats.menu(folder)
+    pages.pop("Families")
+    return _TABLES | {"JUnit": "junit.xml"} | {t: f for g in pages.values() for t, f in g.items()}
 
 
 def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:

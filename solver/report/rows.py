@@ -17,10 +17,14 @@ from ..verification.verdict import (
     VECTORS,
     WORDS,
     Body,
+    CheckResult,
     Verdict,
     read_verdict,
     unbound,
 )
+
+# Checks of the contact pressure, the one on every macro-element first.
+_OF_PRESSURE = "multiplier", "covered_pressure", "element_pressure", "pressure_means", "peak"
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,12 @@ class Row:
         found = [(check.error, check.name) for check in self.verdict.checks]
         known = [(e, n) for e, n in found if n in wanted and not math.isnan(e)]
         return sorted(known, reverse=True)
+
+    @cached_property
+    def pressure_check(self) -> CheckResult | None:
+        """The check of the pressure against its reference: that of multipliers, else of means."""
+        checks = {check.name: check for check in self.verdict.checks if check.verifies}
+        return next((checks[name] for name in _OF_PRESSURE if name in checks), None)
 
     @property
     def accuracy(self) -> tuple[float, str] | None:

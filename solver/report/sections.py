@@ -12,7 +12,7 @@ from ..case.checks import ERRORS
 from . import formats
 from .charts import Chart
 from .errors import draw_errors, drawn, floor
-from .families import Family, Figure, page_name, read_family
+from .families import CodeError, Family, Figure, page_name, read_family
 from .formats import KINDS
 from .pictures import name_of, picture, profile
 from .rows import Row, counted, families, ours
@@ -85,6 +85,20 @@ class FamilySection:
     def own_unit(self, row: Row, kind: str) -> str:
         """The unit that a row's numbers have beside them, where the head of the table has none."""
         return "" if self.unit(kind) else row.verdict.units.get(kind, "")
+
+    def code_error(self, row: Row) -> CodeError | None:
+        """What the first version of the reference code has in a solve: the largest that applies."""
+        codes = self.family.reference_code
+        cells: dict[str, set[str]] = {"slave": set(), "master": set()}
+        for body in row.sides:
+            for role in cells if body.role == "both" else {body.role} & cells.keys():
+                cells[role] |= set(body.cells)
+        mine = [
+            code
+            for code in codes
+            if code.version == codes[0].version and code.applies(cells["slave"], cells["master"])
+        ]
+        return max(mine, key=lambda code: code.error, default=None)
 
     @property
     def cpu(self) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from ..report.charts import Chart, write_script
-from ..report.formats import render
+from ..report.formats import menu, render
 from ..report.tables import as_csv
 from ..system.files import write_text
 from .description import FULL, Study, StudyGroup
@@ -220,6 +220,7 @@ def write_page(
         title=study.title + f" ({level})" * (level != FULL),
         text=study.text,
         table=f"{name}.csv",
+        menu=menu(folder),
         sections=shown.sections,
         outcome=shown.outcome,
         good=not shown.problems,
@@ -231,8 +232,20 @@ def write_page(
     write_text(folder / f"{name}.html", page)
     write_text(folder / f"{name}.csv", as_csv(rows(groups)))
     write_text(folder / f"{name}-failures.txt", failures)
+    if card := card_of(study, groups, level):
+        write_text(folder / f"{name}-card.json", json.dumps(card, ensure_ascii=False) + "\n")
     write_script(folder)
     return f"{failures}{shown.outcome} Page: {folder / name}.html"
+
+
+def card_of(study: Study, groups: Sequence[MeasuredGroup], level: str) -> dict[str, Any]:
+    """What the first screen of the report shows of a study; nothing where its figure has none."""
+    figure = import_module(f".figures.{study.figure}", __package__)
+    mine = [one for one in groups if not one.group.figure and one.solved]
+    if not hasattr(figure, "card") or not mine:
+        return {}
+    known = {"page": page_name(study, level), "level": level, "measured": measured(groups)}
+    return known | {"facts": facts(groups)} | figure.card(mine)
 
 
 def rows(groups: Sequence[MeasuredGroup]) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from solver.report import formats, write_report
+from solver.report.charts import RED
 from solver.verification.results import write_result
 from tests import handmade
 from tests.browser import MISSING, browser
@@ -109,6 +110,17 @@ def test_a_filter_chooses_rows_at_once_and_stays_in_the_address(pages, window):
     assert len(window.run(shown)) == 1 + 7  # 3, 30 … 36
     assert window.run("location.search") == "?text=many-3"
     assert window.run("document.querySelector('output').value") == f"8 of {MANY} solves"
+    tiles = "[...document.querySelectorAll('a.tile:not([hidden])')].map((tile) => tile.dataset.of)"
+    assert window.run(tiles) == ["many"]
+    assert window.run("document.querySelector('a.tile:not([hidden]) [data-word]').innerText") == (
+        "8 passed"
+    )
+    window.run(
+        """((field) => { field.value = "many-3 passed";
+        field.dispatchEvent(new Event("input", {bubbles: true}));
+        })(document.querySelector("[name=text]"))"""
+    )
+    assert len(window.run(shown)) == 8, "both words"
     window.open((pages / "summary.html").resolve().as_uri() + "?verdict=failed")
     assert window.run(shown) == ["bad"]
     window.run("document.querySelector('[type=reset]').click()")
@@ -126,6 +138,33 @@ def test_the_chart_of_all_solves_shows_the_family_picked(pages, window):
     )
     assert 0 < window.wait(f"{marks} < {MANY} ? {marks} : 0") < 10
     assert window.complaints() == []
+
+
+def test_a_solve_that_failed_is_painted_on_top_and_in_the_legend(pages, window):
+    """A cross has a surface: its own colour is under the pointer at its middle."""
+    window.open(pages / "summary.html")
+    window.wait("document.querySelector('#error-against-time svg .mark-symbol.role-mark path')")
+    marks = "[...document.querySelectorAll('#error-against-time svg .mark-symbol path')]"
+    red = window.run(f"{marks}.filter((mark) => mark.getAttribute('fill') === '{RED}').length")
+    assert red == 2, "the mark and its entry in the legend"
+    last = f"{marks}.filter((mark) => mark.closest('.role-mark')).at(-1).getAttribute('fill')"
+    assert window.run(last) == RED
+
+
+def test_a_name_opens_its_solve_in_a_panel_and_closes_it(pages, window):
+    window.open(pages / "fam.html")
+    shown = "[...document.querySelectorAll('article')].filter((one) => one.offsetHeight).length"
+    assert window.run(shown) == 0
+    window.run("document.querySelector('.summary td a').click()")
+    assert window.run(shown) == 1
+    window.run("[...document.querySelectorAll('a.close')].find((one) => one.offsetHeight).click()")
+    assert window.run(shown) == 0
+
+
+def test_the_rows_of_a_family_have_one_line(pages, window):
+    window.open(pages / "fam.html", 1300)
+    rows = "[...document.querySelectorAll('.summary tbody tr:not(.kind, .why)')]"
+    assert max(window.run(f"{rows}.map((row) => row.offsetHeight)")) <= 28
 
 
 def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(pages, window):
@@ -210,7 +249,9 @@ return [counts.size, sum, [...counts].filter(([, n]) => n > 500).length]; })"""
 def turned(window, page, number, **look):
     """Open a page and its result of that number in turn; whether it is drawn."""
     window.open(page, **look)
-    window.run(f"document.querySelectorAll('[data-surfaces]')[{number}].click()")
+    button = f"document.querySelectorAll('[data-surfaces]')[{number}]"
+    window.run(f"(location.hash = {button}.closest('article')?.id ?? '', 0)")
+    window.run(f"{button}.click()")
     window.wait("document.querySelector('.turned canvas')?.width > 100")
     window.wait(f"{SHADES}[0] > 3")
 
@@ -277,6 +318,7 @@ def test_one_result_is_open_at_a_time(pages, window):
     buttons = "document.querySelectorAll('[data-surfaces]')"
     turned(window, pages / "fam.html", 0)
     whole = window.run(f"{buttons}.length")
+    window.run(f"(location.hash = {buttons}[0].closest('article')?.id ?? '', 0)")
     window.run(f"{buttons}[0].click()")
     window.wait(
         f"document.querySelectorAll('.turned').length === 1 && {buttons}.length === {whole}"

@@ -5,8 +5,9 @@ import math
 
 import pytest
 
-from solver.report import formats
+from solver.report import cards, formats
 from solver.report import page as overview
+from solver.report.charts import RED
 from solver.report.families import Family
 from solver.report.rows import Row
 from solver.report.sections import FamilySection
@@ -35,8 +36,8 @@ def rows(tmp_path):
 
 def test_the_sentence_says_how_well(rows):
     assert overview.in_words(rows) == (
-        "Of 4 solves on 2 cell types, 2 reach an exact answer, with errors up to 3.0e-13; "
-        "1 have the error that refined meshes predict, at most 2.0e-02."
+        "Of 4 solves on 2 cell types, 2 reach an exact answer, with errors up to 3.0e-13 "
+        "(multiplier); 1 have the error that refined meshes predict, at most 2 % (multiplier)."
     )
 
 
@@ -99,14 +100,47 @@ def test_without_solves_there_is_nothing_to_show():
     assert overview.digit_chart([]) is None
 
 
-def test_extreme_cases_are_there_with_their_study(tmp_path):
-    assert overview.extreme_cases(tmp_path) is None
-    lines = ["group,line,labels_x,pressure", "tiny-pressure,2D,1e-12,1e-9", "far,3D,1,0.0"]
-    (tmp_path / "stability.csv").write_text("\n".join([*lines, "far,3D,refused,", ""]))
-    records = overview.extreme_cases(tmp_path).spec["data"]["values"]
-    assert [record["quantity"] for record in records] == ["tiny pressure", "far"]
-    assert [record["digits"] for record in records] == [9.0, -math.log10(2.0**-52)]
-    assert records[0]["url"] == "stability.html#map-tiny-pressure"
+CARD = {
+    "page": "stability",
+    "level": "full",
+    "measured": "2 of 2 points are measured.",
+    "facts": [["Machine", "a machine"], ["Revision", "abc"]],
+    "quantities": {"far": {"map": "map-far", "digits": {"2D": [14, 3], "3D": [12, None]}}},
+}
+
+
+def test_a_card_shows_ones_own_study_else_a_part_of_it_else_the_recorded_one(tmp_path):
+    recorded = cards.study_card("stability", tmp_path)
+    assert recorded.link == ""
+    assert recorded.remark.startswith("Recorded: ")
+    quick = CARD | {"level": "quick", "page": "stability-quick"}
+    (tmp_path / "stability-quick-card.json").write_text(json.dumps(quick))
+    part = cards.study_card("stability", tmp_path)
+    assert part.link == "stability-quick.html"
+    assert part.remark.startswith("a part of the study: quick.")
+    (tmp_path / "stability-card.json").write_text(json.dumps(CARD))
+    own = cards.study_card("stability", tmp_path)
+    assert (own.link, own.remark) == ("stability.html", CARD["measured"])
+
+
+@pytest.mark.parametrize("name", ["study", "stability"])
+def test_the_recorded_studies_say_where_they_were_measured(name):
+    content = json.loads((cards.RECORDED / f"{name}.json").read_text())
+    assert {"Measured", "Machine", "Revision"} <= dict(content["facts"]).keys()
+    assert content["level"] == "full"
+    assert content["problems" if name == "study" else "quantities"]
+
+
+@pytest.mark.parametrize(("digits", "color"), [(15, "#0b5d57"), (5, "#f3d28b"), (None, RED)])
+def test_more_digits_are_darker_and_none_are_red(digits, color):
+    assert cards.shade(digits) == color
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.23, "23 %"), (1e-3, "0.1 %"), (2e-12, "2.0e-12"), (math.nan, "–")]
+)
+def test_errors_are_percent_where_people_say_so(value, text):
+    assert formats.percent(value) == text
 
 
 @pytest.mark.parametrize(

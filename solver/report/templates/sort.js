@@ -40,16 +40,17 @@ document.addEventListener("DOMContentLoaded", () => {
   const form = document.querySelector("form.filters");
   if (form) {
     const rows = [...document.querySelectorAll("[data-verdict]")];
-    const entries = rows.map((row) => ({ row, text: row.textContent.toLowerCase(), data: row.dataset }));
+    const said = (row) => `${row.textContent} ${row.dataset.title ?? ""} ${Object.values(row.dataset).join(" ")}`;
+    const entries = rows.map((row) => ({ row, text: said(row).toLowerCase(), data: row.dataset }));
     const address = new URLSearchParams(location.search);
     for (const field of form.elements) if (field.name) field.value = address.get(field.name) ?? "";
     const choose = () => {
       const wanted = [...new FormData(form)].filter(([, value]) => value.trim());
-      const text = wanted.find(([name]) => name === "text")?.[1].trim().toLowerCase() ?? "";
+      const asked = (wanted.find(([name]) => name === "text")?.[1] ?? "").toLowerCase().split(/\s+/);
       const rest = wanted.filter(([name]) => name !== "text");
       let shown = 0;
       for (const { row, text: words, data } of entries) {
-        row.hidden = !(words.includes(text) && rest.every(([name, value]) => data[name].split(" ").includes(value)));
+        row.hidden = !(asked.every((word) => words.includes(word)) && rest.every(([name, value]) => data[name].split(" ").includes(value)));
         shown += !row.hidden;
       }
       for (const part of new Set(rows.map((row) => row.closest("tbody, p.names")))) part.hidden = !part.querySelector("[data-verdict]:not([hidden])");
@@ -57,6 +58,15 @@ document.addEventListener("DOMContentLoaded", () => {
         const any = fold.querySelector("[data-verdict]:not([hidden])");
         fold.open = (wanted.length > 0 && any) || "bad" in fold.dataset;
         fold.closest("details.group").hidden = !any;
+      }
+      for (const tile of document.querySelectorAll("a.tile")) { // a tile is a family: it counts its solves
+        const mine = rows.filter((row) => row.dataset.family === tile.dataset.of && !row.hidden);
+        tile.hidden = !mine.length;
+        for (const badge of tile.querySelectorAll("[data-word]")) {
+          const count = mine.filter((row) => row.dataset.verdict === badge.dataset.word).length;
+          badge.hidden = !count;
+          badge.textContent = `${count} ${badge.dataset.word}`;
+        }
       }
       form.querySelector("output").value = `${shown} of ${rows.length} solves`;
       const query = new URLSearchParams(wanted).toString();

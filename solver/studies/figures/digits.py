@@ -7,13 +7,12 @@ import numpy as np
 from markupsafe import Markup
 
 from ...report import formats
+from ...report.charts import KEPT_DIGITS as COLORS
 from ...report.charts import ORANGE, Chart, Spec, tooltip
 from ..description import Study
 from ..page import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
 
 Record = Mapping[str, Any]
-# Fewest digits and colour, dark is good, also in greyscale (viridis; van der Walt and Smith).
-COLORS = {12: "#440154", 10: "#3b528b", 8: "#21728c", 6: "#27ad81", 4: "#aadc32", 0: "#fde725"}
 NO_RESULT = "#b9c1c9"
 MOST_DIGITS = 16
 # Text is light from so many digits on.
@@ -48,20 +47,12 @@ _HEAD = [
 
 def show(_: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     """A map for each group, then its points in a table."""
-    maps: list[PageSection] = []
+    maps: list[Chart] = []
     tables: list[PageSection] = []
     problems = lost_points(groups)
-    legend = Markup("").join(_legend())
     for one in groups:
         points = [point for point in one.points if "word" in point]
-        maps.append(
-            PageSection(
-                f"map-{one.group.name}",
-                one.title,
-                legend if not maps else "",
-                [draw_map(one, points)],
-            )
-        )
+        maps.append(draw_map(one, points))
         rows = [_row(one, point, i, points) for i, point in enumerate(points)]
         tables.append(
             PageSection(
@@ -76,7 +67,32 @@ def show(_: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     every = [point for one in groups for point in one.points]
     held = sum(bool(point.get("holds")) for point in every)
     outcome = f"{held} of {len(every)} points hold, in {len(groups)} sweeps."
-    return Shown([*maps, *tables], problems, outcome)
+    legend = Markup("").join(_legend())
+    overview = PageSection("maps", "Digits of the pressure, by sweep", legend, maps)
+    return Shown([overview, *tables], problems, outcome)
+
+
+def card(groups: Sequence[MeasuredGroup]) -> dict[str, Any]:
+    """Where each quantity leaves the fewest digits of the pressure, with and without safeguards.
+
+    Of the points that a solve has to master; None where one has no result.
+    """
+    quantities = {}
+    for one in groups:
+        worst: dict[str, list[int | None]] = {}
+        for line in ("2D", "3D"):
+            points = [p for p in one.points if p["line"] == line and not p.get("beyond", True)]
+            if points:
+                cured = [digits(point.get("pressure")) for point in points]
+                uncured = [digits(point["uncured"].get("pressure")) for point in points]
+                worst[line] = [_fewest(cured), _fewest(uncured)]
+        if worst:
+            quantities[one.title] = {"map": f"map-{one.group.name}", "digits": worst}
+    return {"quantities": quantities}
+
+
+def _fewest(counts: Sequence[int | None]) -> int | None:
+    return None if None in counts else min(count for count in counts if count is not None)
 
 
 def _legend() -> list[Markup]:

@@ -150,6 +150,31 @@ def show(_: Study, groups: Sequence[MeasuredGroup]) -> Shown:
     return Shown(sections, lost_points(groups, allowed=(REFUSED, "failed")), measured(groups))
 
 
+# What the first screen of the report shows: an error, the accuracies, and the problem of its chart.
+_FIRST, _FIRST_TARGETS, _FIRST_CHART = "pressure_means", (1e-2, 1e-3, 1e-4), "manufactured-2d"
+
+
+def card(groups: Sequence[MeasuredGroup]) -> dict[str, Any]:
+    """The fastest way to each accuracy by problem, and the curves of one of them."""
+    panels = [panel for one in groups if (panel := Panel(one, _FIRST)).lines]
+    problems = {}
+    for panel in panels:
+        found = [panel.quickest(target) for target in _FIRST_TARGETS]
+        problems[panel.group.title] = [
+            [" or ".join(ways), time_of(next(iter(ways.values()))).median] if ways else None
+            for ways in found
+        ]
+    curves = [panel for panel in panels if panel.group.group.name == _FIRST_CHART] or panels[:1]
+    pairs = [grouped(panel.group.solved, lambda point: point["series"]) for panel in curves]
+    pair, points = max(pairs[0].items(), key=lambda item: len(item[1])) if pairs else ("", [])
+    return {
+        "accuracies": [TARGETS[target] for target in _FIRST_TARGETS],
+        "problems": problems,
+        "chart": f"{curves[0].group.title}, {pair}" if curves else "",
+        "curves": [_record(curves[0], point) for point in points if _FIRST in point["errors"]],
+    }
+
+
 def _overview(panel: Panel) -> TableRow:
     cells = [panel.group.title, WORDS[panel.error]]
     for target in TARGETS:
