@@ -130,6 +130,7 @@ def test_a_filter_chooses_rows_at_once_and_stays_in_the_address(pages, window):
 
 def test_the_chart_of_all_solves_shows_the_family_picked(pages, window):
     window.open(pages / "summary.html")
+    window.run("document.querySelector('#error-against-time').scrollIntoView({block: 'center'})")
     marks = "document.querySelectorAll('#error-against-time .mark-symbol.role-mark path').length"
     window.wait(f"{marks} >= {MANY}")
     window.run(
@@ -143,6 +144,7 @@ def test_the_chart_of_all_solves_shows_the_family_picked(pages, window):
 def test_a_solve_that_failed_is_painted_on_top_and_in_the_legend(pages, window):
     """A cross has a surface: its own colour is under the pointer at its middle."""
     window.open(pages / "summary.html")
+    window.run("document.querySelector('#error-against-time').scrollIntoView({block: 'center'})")
     window.wait("document.querySelector('#error-against-time svg .mark-symbol.role-mark path')")
     marks = "[...document.querySelectorAll('#error-against-time svg .mark-symbol path')]"
     red = window.run(f"{marks}.filter((mark) => mark.getAttribute('fill') === '{RED}').length")
@@ -169,6 +171,7 @@ def test_the_rows_of_a_family_have_one_line(pages, window):
 
 def test_the_wheel_scrolls_the_page_and_zooms_with_ctrl(pages, window):
     window.open(pages / "summary.html")
+    window.run("document.querySelector('#error-against-time').scrollIntoView({block: 'center'})")
     window.wait("document.querySelector('#error-against-time svg')")
     window.run("document.querySelector('#error-against-time').scrollIntoView({block: 'center'})")
     ticks = """[...document.querySelectorAll('#error-against-time .role-axis-label text')]

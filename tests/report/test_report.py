@@ -193,9 +193,9 @@ def test_pages_ask_for_nothing_from_outside(report, name):
     folder, _ = report
     page = Page(folder / name)
     assert not {"link", "iframe", "object"} & set(page.tags)
-    # Our own, the script of the charts with a chart, that of results to turn on the page of a
-    # family, and nothing that a verdict brought in.
-    assert page.tags.count("script") == 3 + (name == "fam.html")
+    # Our own, the script of the charts with a chart; that of results to turn on the page of a
+    # family, the chart of the recorded study on the first one; nothing that a verdict brought in.
+    assert page.tags.count("script") == 4
     for source in (v for key, v in page.values if key == "src"):
         assert (folder / unquote(source)).is_file()
     links = [v for key, v in page.values if key in ("href", "xlink:href")]
