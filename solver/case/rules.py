@@ -98,7 +98,7 @@ def _in_zones(case: Case) -> Iterator[Fault]:
         yield from _in_zone(f"contact[{i}]", zone)
         cyclic = any(support.cyclic for support in case.supports)
         if cyclic and zone.treatment not in _CYCLIC:
-            allowed = f"with supports that are cyclic must be one of {', '.join(_CYCLIC)}"
+            allowed = f"must be {' or '.join(_CYCLIC)} where supports are cyclic"
             yield f"contact[{i}].treatment", zone.treatment, allowed
         names.add(zone.name)
     for i, item in enumerate(case.observe):

@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..verification.savings import Savings, read_savings
-from .charts import KEPT_DIGITS, RED, Axis, Chart, Look, level, series_chart
+from .charts import MANY, RED, Axis, Chart, Look, level, series_chart, shade_of
 from .families import CodeError
 from .rows import Row, families, ours
 from .sections import FamilySection
 
 RECORDED = Path(__file__).with_name("recorded")
-_MANY = ("#0072b2", "#d55e00", "#009e73", "#aa5588", "#1f2933", "#e69f00", "#56b4e9", "#66727f")
-
 # What each switch of `solver.simulation.options.Shortcuts` leaves out, in the order of the work.
 WORK = {
     "quadrature": "Gauss points beyond those needed",
@@ -64,7 +62,7 @@ def curves(card: StudyCard) -> Chart | None:
     if not records:
         return None
     names = list(dict.fromkeys(record["series"] for record in records))
-    looks = {name: Look(_MANY[i % len(_MANY)]) for i, name in enumerate(names)}
+    looks = {name: Look(MANY[i % len(MANY)]) for i, name in enumerate(names)}
     return series_chart(
         "first-error-time",
         f"Error of the pressure against run time: {card.content['chart']}",
@@ -81,10 +79,8 @@ def curves(card: StudyCard) -> Chart | None:
 
 
 def shade(digits: int | None) -> str:
-    """The colour of so many digits."""
-    if digits is None:
-        return RED
-    return next(color for least, color in KEPT_DIGITS.items() if digits >= least)
+    """The colour of so many digits; None: there is no result."""
+    return RED if digits is None else shade_of(digits)
 
 
 @dataclass(frozen=True)
@@ -143,9 +139,13 @@ class WorkCard:
         return self.saved / (self.saved + self.spent) if self.spent else 0.0
 
 
-def work_card(rows: Sequence[Row], folder: Path) -> WorkCard:
+# By family: solves, how many of them left out each kind of `WORK`, and the time that saved.
+LeftOut = dict[str, tuple[int, list[int], Savings | None]]
+
+
+def work_card(rows: Sequence[Row], left_out: LeftOut) -> WorkCard:
     """The sums over all families."""
-    found = left_out_by_family(rows, folder).values()
+    found = left_out.values()
     counts = [sum(column) for column in zip(*(used for _, used, _ in found), strict=True)]
     saved = sum(time.saved for _, _, time in found if time)
     spent = sum(row.verdict.cpu_seconds or 0.0 for row in ours(rows))
@@ -153,14 +153,9 @@ def work_card(rows: Sequence[Row], folder: Path) -> WorkCard:
     return WorkCard(saved, spent, kinds, sum(count for count, _, _ in found))
 
 
-def left_out_by_family(
-    rows: Sequence[Row], folder: Path
-) -> dict[str, tuple[int, list[int], Savings | None]]:
-    """By family: how many solves, how many of them left out each kind of `WORK`, time saved.
-
-    The times are in `folder`, that of the report.
-    """
-    found: dict[str, tuple[int, list[int], Savings | None]] = {}
+def left_out_by_family(rows: Sequence[Row], folder: Path) -> LeftOut:
+    """What solves left out; the times are in `folder`, that of the report."""
+    found: LeftOut = {}
     solved = [row for row in ours(rows) if row.verdict.dofs]
     for family, mine in families(solved).items():
         counts = [sum(switch in row.verdict.switches for row in mine) for switch in WORK]
@@ -168,7 +163,7 @@ def left_out_by_family(
     return found
 
 
-def of(sections: Sequence[FamilySection], folder: Path) -> dict[str, Any]:
+def of(sections: Sequence[FamilySection], folder: Path, left_out: LeftOut) -> dict[str, Any]:
     """The cards by name; None where there is nothing to show."""
     rows = [row for section in sections for row in section.rows]
     study = study_card("study", folder)
@@ -176,7 +171,7 @@ def of(sections: Sequence[FamilySection], folder: Path) -> dict[str, Any]:
         "study": study,
         "curves": curves(study) if study else None,
         "stability": study_card("stability", folder),
-        "work": work_card(rows, folder),
+        "work": work_card(rows, left_out),
         "patch": patch_card(sections),
         "shade": shade,
     }

@@ -38,6 +38,9 @@ CROSS = "M-1,-.6L-.6,-1L0,-.4L.6,-1L1,-.6L.4,0L1,.6L.6,1L0,.4L-.6,1L-1,.6L-.4,0Z
 SHAPES = ("circle", "square", "triangle-up", "triangle-down", "diamond", CROSS)
 # The fewest digits kept that have a colour: dark is good, bad is told by its hue.
 KEPT_DIGITS = {12: "#0b5d57", 10: "#1d7a74", 8: "#3f8f8a", 6: "#9cc7b8", 4: "#f3d28b", 0: "#e8794b"}
+# Colours of series that no meaning sets apart; Okabe and Ito's yellow is left out, which paper does
+# not show.
+MANY = (BLUE, ORANGE, PURPLE, INK, GREEN, "#e69f00", "#56b4e9")
 # Digits of a number in a page.
 DIGITS = 10
 # The values of a mark under the pointer: powers of ten as 1.2e-10.
@@ -67,6 +70,11 @@ LOOKS = {
     "PENTA": Look(GREEN, "triangle-up"),
     "PYRA": Look(PURPLE, "diamond"),
 }
+
+
+def shade_of(digits: int) -> str:
+    """The colour of so many digits kept."""
+    return next(color for least, color in KEPT_DIGITS.items() if digits >= least)
 
 
 def look_of(cells: str, looks: Mapping[str, Look] = LOOKS) -> Look:

@@ -160,6 +160,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
     """The main page: what was verified, failures first, one table a family."""
     rows = [row for section in sections for row in section.rows]
     bad = [row for row in ours(rows) if not row.sound]
+    work = left_out_by_family(rows, folder)
     checks = {check.name: check for row in rows for check in row.verdict.checks}
     return render(
         TEMPLATES / "summary.html.jinja",
@@ -169,7 +170,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         charts=True,
         links=_links(folder),
         menu=_menu(sections, folder),
-        cards=cards.of(sections, folder),
+        cards=cards.of(sections, folder, work),
         bad=bad,
         causes=causes(bad),
         choices=choices(rows),
@@ -179,7 +180,7 @@ def main_page(sections: Sequence[FamilySection], folder: Path) -> str:
         fewest=fewest_digits(rows),
         digits_kept=digits_kept,
         cause=cause,
-        left_out=left_out_by_family(rows, folder),
+        left_out=work,
         switches=WORK,
         good=bool(rows) and not bad,
         outcome=outcome(rows),
@@ -212,7 +213,6 @@ def family_page(
         choices=choices(section.rows),
         orders=(folder / f"orders-{section.name}.html").is_file(),
         norms=ERRORS,
-        stages=formats.colors(stage for row in section.rows for stage in row.stages),
         picture=lambda row: picture(row, section.pictures),
         pressure=lambda row: _pressure(row, section.pictures),
         left_out=left_out(section.rows),

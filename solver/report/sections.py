@@ -65,12 +65,6 @@ class FamilySection:
         """How many rows there are of each verdict."""
         return counted(ours(self.rows))
 
-    @property
-    def counted(self) -> bool:
-        """Whether the numbers of cells or faces of a reference's meshes are known."""
-        bodies = [body for row in self.rows for body in row.sides]
-        return any((body.reference_cells, body.reference_faces) != (None, None) for body in bodies)
-
     def is_one(self, name: str) -> bool:
         """Whether a quantity is one everywhere in all solves: its column would say nothing."""
         known = [getattr(row.verdict, name) for row in self.rows]

@@ -12,7 +12,7 @@ from solver.mechanics.mortar.coulomb import CoulombContact
 from solver.simulation.scene import operators
 from solver.simulation.scene.parts import strain
 from solver.simulation.scene.parts.springs import Springs
-from solver.simulation.scene.parts.strain import Strains
+from solver.simulation.scene.parts.strain import StrainFields
 from solver.simulation.scene.scene import Scene
 
 
@@ -61,7 +61,7 @@ def _springs_at_full_load(true: Any) -> Any:
 
 
 def _strain_without_name(true: Any) -> Any:
-    def factors(self: Strains, step: Any) -> np.ndarray:
+    def factors(self: StrainFields, step: Any) -> np.ndarray:
         return true(self, 1.0 if isinstance(step, dict) else step)
 
     return factors
@@ -122,7 +122,7 @@ FAULTS = (
         "strain-without-name",
         "initial strain has no factor in a step of names",
         {"also": "strain", "steps": "path"},
-        Strains,
+        StrainFields,
         "factors",
         _strain_without_name,
     ),

@@ -151,7 +151,7 @@ def test_the_command_line_does_everything(tmp_path, capsys):
 
 # What a feature is called in the names of functions and of files of its own.
 FEATURES = re.compile(
-    r"rigid(?!_motion|Motion)|spring|mixed|initial_strain|StrainTerm|Strains|frict|slip(?!_$)|stick"
+    r"rigid(?!_motion|Motion)|spring|mixed|initial_strain|StrainTerm|StrainFields|frict|slip(?!_$)|stick"
     r"|coulomb|cyclic|together|tied|copied|released|probe|stabilis|couple|tangential|quadric",
     re.IGNORECASE,
 )

@@ -2,6 +2,7 @@
 
 import pytest
 
+from solver.report.charts import shade_of
 from solver.simulation.options import Safeguards
 from solver.studies import digits
 from solver.studies.description import read_study
@@ -115,4 +116,4 @@ def test_every_point_has_three_squares_that_lead_to_its_row():
 def test_digits_and_their_shades():
     assert [figure.digits(e) for e in (0.0, 1e-20, 2e-14, 0.5, 7.0)] == [16, 16, 13, 0, 0]
     assert figure.digits(None) is None
-    assert figure.shade(16) != figure.shade(11) != figure.shade(0)
+    assert shade_of(16) != shade_of(11) != shade_of(0)

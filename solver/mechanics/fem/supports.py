@@ -22,11 +22,11 @@ class SupportClashError(Exception):
         self.number, self.value = number, value
 
 
-class TieError(Exception):
-    """A tie, by its `number`, has degrees of freedom that another one or a support takes."""
+class LinkError(Exception):
+    """Nodes that should move with others, by the `number` of the tie or copy, cannot."""
 
-    def __init__(self, number: int, count: int):
-        super().__init__(f"{count} of its nodes are held there, or tied, by another support")
+    def __init__(self, number: int, problem: str):
+        super().__init__(problem)
         self.number = number
 
 
@@ -111,14 +111,6 @@ def free_motion(n_nodes: int, dim: int, fixed: Sequence[Fixed]) -> FreeMotion:
     return _basis(held, count, offset)
 
 
-class CopyError(Exception):
-    """A copy, by its `number`, of nodes that supports hold in another way, or that are copies."""
-
-    def __init__(self, number: int, problem: str):
-        super().__init__(problem)
-        self.number = number
-
-
 @dataclass(frozen=True)
 class Copies:
     """Nodes `copy` (n,) that have the displacement of nodes `of` (n,), turned by `turn`."""
@@ -132,7 +124,7 @@ def copied(free: FreeMotion, copies: Sequence[Copies]) -> FreeMotion:
     """What is left free where nodes are turned copies of others; a node may be its own copy.
 
     The displacement u of a node is left free in the directions v that supports leave free there,
-    with the turn of v at the copy. Raises CopyError.
+    with the turn of v at the copy. Raises LinkError.
 
     >>> turned = Copies(np.array([0]), np.array([1]), np.array([[0.0, -1.0], [1.0, 0.0]]))
     >>> copied(free_motion(2, 2, []), [turned]).basis.toarray().round(3).T.tolist()
@@ -141,7 +133,7 @@ def copied(free: FreeMotion, copies: Sequence[Copies]) -> FreeMotion:
     for number, each in enumerate(copies):
         pairs = np.concatenate([each.of, each.copy[each.copy != each.of]])
         if len(np.unique(pairs)) < len(pairs):
-            raise CopyError(number, "a node is the copy of two others, or itself copied")
+            raise LinkError(number, "a node is the copy of two others, or itself copied")
         free = _with_copies(free, each, number)
     return free
 
@@ -151,7 +143,7 @@ def _with_copies(free: FreeMotion, copies: Copies, number: int) -> FreeMotion:
     dofs = [dim * nodes[:, None] + np.arange(dim) for nodes in (copies.of, copies.copy)]
     projector = (free.basis @ free.basis.T).tocsr()
     if _spread(projector, dofs):
-        raise CopyError(number, "its nodes are tied, or copies, by another support")
+        raise LinkError(number, "its nodes are tied, or copies, by another support")
     held = [np.eye(dim) - _blocks(projector, each) for each in dofs]
     given = [np.einsum("nij,nj->ni", h, free.offset[d]) for h, d in zip(held, dofs, strict=True)]
     own = (copies.of == copies.copy)[:, None, None] * (
@@ -166,7 +158,7 @@ def _with_copies(free: FreeMotion, copies: Copies, number: int) -> FreeMotion:
     missing = np.abs(np.einsum("nij,nj->ni", held[0], start) - given[0])
     missing += np.abs(np.einsum("nij,nj->ni", held[1], start @ turn.T) - given[1])
     if (missing > SAME * np.abs(free.offset).max(initial=0.0)).any():
-        raise CopyError(number, "supports give its nodes another displacement than the copied ones")
+        raise LinkError(number, "supports give its nodes another displacement than the copied ones")
     offset = free.offset.copy()
     offset[dofs[0]], offset[dofs[1]] = start, start @ turn.T
     values, vectors = np.linalg.eigh(resistance)
@@ -205,7 +197,7 @@ def _spread(projector: sparse.csr_matrix, dofs: Sequence[np.ndarray]) -> bool:
 def tied(free: FreeMotion, ties: Sequence[np.ndarray]) -> FreeMotion:
     """What is left free where all degrees of freedom (n,) of each tie have one displacement.
 
-    Raises TieError where one is not free by itself.
+    Raises LinkError where one is not free by itself.
 
     >>> tied(free_motion(2, 1, []), [np.array([0, 1])]).basis.toarray().round(4).tolist()
     [[0.7071], [0.7071]]
@@ -218,7 +210,9 @@ def tied(free: FreeMotion, ties: Sequence[np.ndarray]) -> FreeMotion:
     into = np.arange(free.basis.shape[1])
     for number, dofs in enumerate(ties):
         if not alone[dofs].all():
-            raise TieError(number, int((~alone[dofs]).sum()))
+            taken = int((~alone[dofs]).sum())
+            problem = f"{taken} of its nodes are held there, or tied, by another support"
+            raise LinkError(number, problem)
         unknowns = rows.indices[rows.indptr[dofs]]
         into[unknowns] = unknowns.min()
         alone[dofs] = False

@@ -129,7 +129,7 @@ class CoulombContact:
             best = min(best, fault)
             if not np.isfinite(step := self._step(law)).all():
                 return None
-            z = z + (self._length(z, step, law, start) if searches else 1.0) * step
+            z = z + (self._length(z, step, law) if searches else 1.0) * step
         return None
 
     def corrected(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, float]:
@@ -154,12 +154,11 @@ class CoulombContact:
         bound = self.friction * np.maximum(forces[:m][self.of], 0.0)
         return closed, closed[self.of] & (far > bound - along)
 
-    def _length(self, z: np.ndarray, step: np.ndarray, law: _Law, start: np.ndarray) -> float:
+    def _length(self, z: np.ndarray, step: np.ndarray, law: _Law) -> float:
         """The share of a step that lowers the fault; all of it where none does."""
         length, now, along = 1.0, np.linalg.norm(law.fault), self.stiffness @ step
-        forces = start + self.stiffness @ z
         while length > _SHORTEST:
-            then = self._law(z + length * step, forces + length * along)
+            then = self._law(z + length * step, law.forces + length * along)
             if np.linalg.norm(then.fault) < (1 - 1e-4 * length) * now:
                 return length
             length /= 2
@@ -179,7 +178,7 @@ class CoulombContact:
         return _Law(fault, forces, a[:m] > 0, slips, unit, bound / length)
 
     def _step(self, law: _Law) -> np.ndarray:
-        """Newton's step (r,) for a law; not finite where there is none."""
+        """The Newton step (r,) at a law; NaN where its derivative is singular."""
 
         def fault(z: np.ndarray, forces: np.ndarray) -> np.ndarray:
             slope, found, m = forces - self.c[:, None] * z, forces.copy(), self.m

@@ -19,7 +19,13 @@ from ...lac.cells.shape import has_straight_edges
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.elasticity import lame_parameters
 from ...mechanics.fem.loads import body_forces, face_forces, stress_forces
-from ...mechanics.fem.supports import Fixed, FreeMotion, SupportClashError, free_motion
+from ...mechanics.fem.supports import (
+    Fixed,
+    FreeMotion,
+    LinkError,
+    SupportClashError,
+    free_motion,
+)
 from ...system.errors import InputError
 from .cut_groups import CutGroups
 from .groups import ALL
@@ -135,7 +141,11 @@ class Attributes(CutGroups):
             key = list(fixed)[clash.number]
             raise InputError(self.case.path, key, clash.value, f"{clash}{remark}") from None
         for holding in self.holdings:
-            free = holding.link(free)
+            try:
+                free = holding.link(free)
+            except LinkError as error:
+                key = holding.keys[error.number]
+                raise InputError(self.case.path, key, None, str(error)) from None
         return free
 
     def exact_displacement(self, nodes: np.ndarray) -> np.ndarray:

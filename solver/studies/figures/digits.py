@@ -7,8 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ...report import formats
-from ...report.charts import KEPT_DIGITS as COLORS
-from ...report.charts import ORANGE, Chart, Spec, tooltip
+from ...report.charts import KEPT_DIGITS, ORANGE, Chart, Spec, shade_of, tooltip
 from ..description import Study
 from ..page import MeasuredGroup, PageSection, Shown, Table, TableRow, lost_points
 
@@ -98,10 +97,10 @@ def _fewest(counts: Sequence[int | None]) -> int | None:
 def _legend() -> list[Markup]:
     """The colours; the number is the fewest digits that have it."""
     swatch = Markup('<span class=stage><i style="background:{}"></i>{}</span>')
-    last = list(COLORS)[-1]
+    last = list(KEPT_DIGITS)[-1]
     return [
         swatch.format(color, f"{least} or more digits" if least != last else "fewer")
-        for least, color in COLORS.items()
+        for least, color in KEPT_DIGITS.items()
     ]
 
 
@@ -118,11 +117,6 @@ def digits(error: float | None) -> int | None:
     if error is None:
         return None
     return int(np.clip(np.floor(-np.log10(error)), 0, MOST_DIGITS)) if error > 0 else MOST_DIGITS
-
-
-def shade(count: int) -> str:
-    """The colour of so many digits."""
-    return next(color for least, color in COLORS.items() if count >= least)
 
 
 def draw_map(group: MeasuredGroup, points: Sequence[Record]) -> Chart:
@@ -174,7 +168,7 @@ def _square(group: MeasuredGroup, point: Record, name: str) -> dict[str, Any]:
         "stress": of_stress,
         "reason": source["reason"] if count is None else "",
         "text": text,
-        "color": NO_RESULT if count is None else shade(count),
+        "color": NO_RESULT if count is None else shade_of(count),
         "frame": name == "cured" and not point["holds"],
         "url": f"#{anchor(group, point)}",
     }

@@ -11,6 +11,7 @@ from ...case.checks import ERRORS as WORDS
 from ...report import formats
 from ...report.charts import (
     EPSILON,
+    MANY,
     RED,
     SHAPES,
     Axis,
@@ -49,8 +50,6 @@ TIE = 1.1
 """Times of two treatments that differ by less than this factor are equal within noise."""
 LIMIT = 1e-3
 _NEAR = 1e-11
-# Okabe and Ito's colours; yellow is left out, which paper does not show.
-_COLORS = ("#0072b2", "#d55e00", "#aa5588", "#1f2933", "#009e73", "#e69f00", "#56b4e9")
 _DASHES: tuple[tuple[float, ...], ...] = ((), (6, 3), (1.5, 3), (7, 2, 1.5, 2))
 _TIPS = {
     "level": "level",
@@ -218,7 +217,7 @@ def looks_of(group: MeasuredGroup) -> dict[str, Look]:
         if title not in looks:
             kind = " ".join(name.split("-")[0] for name in point["choices"].values())
             variant = kinds[kind] = kinds.get(kind, -1) + 1
-            color = _COLORS[list(kinds).index(kind) % len(_COLORS)]
+            color = MANY[list(kinds).index(kind) % len(MANY)]
             looks[title] = Look(
                 color, SHAPES[len(looks) % len(SHAPES)], _DASHES[variant % len(_DASHES)]
             )

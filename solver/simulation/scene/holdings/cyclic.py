@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ....mechanics.fem.supports import Copies, CopyError, FreeMotion, copied
+from ....mechanics.fem.supports import Copies, FreeMotion, copied
 from ....mesh.transforms import rotation
 from ....system.errors import InputError
 from ..cut_groups import CutGroups
@@ -19,15 +19,12 @@ class CyclicSides(Holding):
     """The sides of a case that are copies."""
 
     def __init__(self, groups: CutGroups):
-        self._case, self._copies = groups.case, copies_of(groups)
+        copies = copies_of(groups)
+        self.keys, self._copies = list(copies), list(copies.values())
 
     def link(self, free: FreeMotion) -> FreeMotion:
-        """Copies move as their originals; InputError where supports are against it."""
-        try:
-            return copied(free, list(self._copies.values()))
-        except CopyError as error:
-            key = list(self._copies)[error.number]
-            raise InputError(self._case.path, key, None, str(error)) from None
+        """Copies move as their originals do."""
+        return copied(free, self._copies)
 
 
 def copies_of(groups: CutGroups) -> dict[str, Copies]:

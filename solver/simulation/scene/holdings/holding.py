@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 class Holding:
     """Something that holds or joins bodies. What is not stated is nothing."""
 
+    keys: Sequence[str] = ()
+    """The keys of the case file of what `link` joins."""
     frames: Mapping[str, Frame] = {}
     """The rigid bodies by name."""
     moving: np.ndarray | None = None
@@ -33,7 +35,7 @@ class Holding:
         return {}
 
     def link(self, free: FreeMotion) -> FreeMotion:
-        """What it leaves free of a motion, or frees again."""
+        """What it leaves free of a motion, or frees again; LinkError where it cannot."""
         return free
 
     def force(self, name: str | None = None) -> Any:  # noqa: ARG002

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....mechanics.fem.supports import FreeMotion, TieError, tied
+from ....mechanics.fem.supports import FreeMotion, tied
 from ....system.errors import InputError
 from ..cut_groups import CutGroups
 from .holding import Holding
@@ -14,15 +14,12 @@ class Together(Holding):
     """The ties of a case."""
 
     def __init__(self, groups: CutGroups):
-        self._case, self._ties = groups.case, ties_of(groups)
+        ties = ties_of(groups)
+        self.keys, self._ties = list(ties), list(ties.values())
 
     def link(self, free: FreeMotion) -> FreeMotion:
-        """Their nodes have one displacement; InputError where they are not free for it."""
-        try:
-            return tied(free, list(self._ties.values()))
-        except TieError as error:
-            key = list(self._ties)[error.number]
-            raise InputError(self._case.path, key, None, str(error)) from None
+        """The nodes of each have one displacement."""
+        return tied(free, self._ties)
 
 
 def ties_of(groups: CutGroups) -> dict[str, np.ndarray]:

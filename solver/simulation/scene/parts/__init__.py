@@ -35,9 +35,9 @@ def parts_of(
 
         parts.append(springs_of(groups))
     if any(load.strains for load in case.loads):
-        from .strain import Strains
+        from .strain import StrainFields
 
-        strain = Strains(groups)
+        strain = StrainFields(groups)
     if in_mixed_form and any(material.mixed for material in case.materials.values()):
         from .mixed import split_off
 

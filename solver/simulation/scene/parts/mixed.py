@@ -17,7 +17,7 @@ from .part import ModelPart, Nodal, Term
 
 if TYPE_CHECKING:
     from ..attributes import Attributes
-    from .strain import Strains
+    from .strain import StrainFields
 
 # The mean stress (size,), and ∫ q tr ε₀ (size,) of initial strains, which stays.
 _Inner = tuple[np.ndarray, np.ndarray]
@@ -62,7 +62,7 @@ class MixedForm(ModelPart):
 
     factored = "nearly incompressible cells: multigrid does not converge"
 
-    def __init__(self, points: np.ndarray, mean: MeanStress, strains: Strains | None):
+    def __init__(self, points: np.ndarray, mean: MeanStress, strains: StrainFields | None):
         self.mean, self._strains, self.stiffness = mean, strains, mean.stiffness()
         self._swelling = np.zeros((0, mean.size))
         if strains is not None:
@@ -86,7 +86,7 @@ class MixedForm(ModelPart):
 
 
 def split_off(
-    groups: Attributes, blocks: list[Block], strains: Strains | None
+    groups: Attributes, blocks: list[Block], strains: StrainFields | None
 ) -> tuple[list[Block], MixedForm]:
     """The blocks, with λ = 0 where the material is in mixed form, and the mean stress there."""
     mixed = groups.by_material(lambda material: float(material.mixed), 0.0)

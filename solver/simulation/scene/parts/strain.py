@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..attributes import Attributes
 
 
-class Strains:
+class StrainFields:
     """The k initial strains of a case as fields, and their factors in a step."""
 
     def __init__(self, groups: Attributes):
@@ -99,7 +99,7 @@ class _StrainTerm(Term):
 class InitialStrain(ModelPart):
     """The initial strains of a case in its blocks of cells."""
 
-    def __init__(self, groups: Attributes, blocks: list[Block], strains: Strains):
+    def __init__(self, groups: Attributes, blocks: list[Block], strains: StrainFields):
         self._strains = strains
         self._loads = strain_loads(groups.points, blocks, strains, strains.count)
         # Where all of a body is held, its initial strain is stress.
