@@ -92,6 +92,10 @@ _NORMS = (
 CHECKS: tuple[Check, ...] = (
     Check("multiplier", "contact pressure: the multiplier of every macro-element", "pressure",
           "load", alias="LAGS_C", key="contact_pressure"),
+    Check("position_pressure",
+          "contact pressure of every covered contact element at all positions before the last one",
+          "at_positions", "load", of="pressure", key="contact_pressure", when="moving",
+          like="multiplier"),
     Check("nodal_stress", "normal stress at every node of both bodies", "nodal_stress", "load",
           alias="SIEF_NOEU", key="normal_stress", by_zone=False),
     Check("surface_stress_slave", "normal stress on the slave surface", "surface_stress", "load",
@@ -125,6 +129,11 @@ CHECKS: tuple[Check, ...] = (
           "friction_law", "unit", when="frictional", tolerance=1e-09, fixed=True),
     Check("friction_traction", "traction of friction on every contact element of the slave",
           "friction", "load", of="friction_traction", key="friction_traction"),
+    Check("position_friction",
+          "traction of friction on every covered contact element at all positions before the last "
+          "one",
+          "at_positions", "load", of="friction_traction", key="friction_traction", when="moving",
+          like="friction_traction"),
     Check("slip", "slip of the master on every contact element, in the last step", "friction",
           "elongation", of="slip", key="slip"),
     Check("stick_area", "area that sticks", "stick_area", "unit", key="stick_area"),

@@ -294,6 +294,8 @@ class CaseFile(Section, frozen=True):
     directions: solved once, or again with slave and master exchanged
     steps: load factors, solved one after the other in any order, or the factors of named loads and
       supports
+    motion: small, or large where bodies slide or roll far along the path of the steps, with small
+      strains
     observe: macro-elements to report at every step
     probes: points and nodes whose displacement and stress, or contact pressure, are results
     reference: what the result is compared with
@@ -322,6 +324,7 @@ class CaseFile(Section, frozen=True):
     steps: Annotated[tuple[_Step, ...], Meta(min_length=1, max_length=1000, description=_STEPS)] = (
         1.0,
     )
+    motion: Literal["small", "large"] = "small"
     observe: tuple[Observation, ...] = ()
     probes: dict[Name, Probe] = field(default_factory=dict)
     reference: ReferenceKeys | None = None

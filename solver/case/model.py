@@ -72,6 +72,7 @@ class Case:
     plane: str | None = None
     directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
+    motion: str = "small"
     observe: tuple[Observation, ...] = ()
     probes: dict[str, Probe] = field(default_factory=dict)
     reference: dict[str, Any] = field(default_factory=dict)
@@ -104,6 +105,11 @@ class Case:
         """The load factor of each step; its number where loads have factors of their own."""
         numbered = enumerate(self.steps, start=1)
         return tuple(float(n) if isinstance(step, dict) else step for n, step in numbered)
+
+    @property
+    def moving(self) -> bool:
+        """Whether bodies may move far along the path of the steps."""
+        return self.motion == "large"
 
     @property
     def frictional(self) -> bool:

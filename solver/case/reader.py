@@ -105,6 +105,7 @@ class _Reader:
             plane=file.plane,
             directions=file.directions,
             steps=self.steps(),
+            motion=file.motion,
             probes={
                 name: read_marked(probe, ("probes", name), self.read)
                 for name, probe in file.probes.items()

@@ -55,6 +55,8 @@ def _faults(case: Case) -> Iterator[Fault]:
     yield from _in_reference(case)
     if case.rigid:
         yield from _in_rigid(case)
+    if case.moving:
+        yield from _of_moving(case)
     for group, material in case.materials.items():
         if case.thin and material.form == "mixed":
             allowed = "plane stress has no incompressible limit; allowed: automatic, displacement"
@@ -211,6 +213,31 @@ def _in_rigid(case: Case) -> Iterator[Fault]:
                 yield f"contact[{i}].slave", name, allowed
             if name == zone.master and case.directions == "both":
                 yield f"contact[{i}].master", name, f"{allowed}, so directions must be `first`"
+
+
+def _of_moving(case: Case) -> Iterator[Fault]:
+    """What does not go with bodies that move far."""
+    motion = "does not go with `motion: large`"
+    for i, support in enumerate(case.supports):
+        for key in ("together", "cyclic"):
+            if getattr(support, key):
+                yield f"supports[{i}].{key}", None, f"{motion}; allowed: fix, spring"
+    for i, load in enumerate(case.loads):
+        if load.strains:
+            yield f"loads[{i}].{load.kind}", None, f"{motion}; allowed: loads of other kinds"
+    for i, zone in enumerate(case.zones):
+        if zone.clearance is not None:
+            allowed = f"{motion}, which finds the gap itself; allowed: interference"
+            yield f"contact[{i}].clearance", zone.clearance, allowed
+    for name, probe in case.probes.items():
+        if probe.at:
+            yield f"probes.{name}.at", list(probe.at), f"{motion}; allowed: group"
+    if case.solution:
+        allowed = f"{motion}; allowed: a reference of values"
+        yield "reference.solution", case.solution.name, allowed
+    if "displacement" in case.reference:
+        allowed = f"{motion}; allowed: displacement_at, the whole displacement at a group"
+        yield "reference.displacement", None, allowed
 
 
 def _of_dimension(case: Case, dim: int) -> Iterator[Fault]:

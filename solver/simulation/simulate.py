@@ -1,25 +1,20 @@
 """Solve a case on a mesh: from case and mesh to a Solution."""
 
 import logging
-import resource
 from dataclasses import replace
-from functools import partial
-from typing import Any
 
 import meshio
-import numpy as np
 
 from ..case.acting import Step
-from ..case.model import STATE, Case
+from ..case.model import Case
 from ..lac.errors import SolveError
-from ..system.process import peak_mb
 from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .equilibrium.problem import ContactProblem
 from .equilibrium.recovery import Recovered, recovered
 from .equilibrium.state import Equilibrium
-from .judgement.consistency import inconsistency
-from .judgement.plan import decided, estimated, plan_notes, softness_notes
-from .judgement.validity import remarks, validity
+from .finished import called, finished, tell
+from .judgement.plan import decided, plan_notes
+from .judgement.validity import validity
 from .options import LEAN, Options
 from .results.results import solution_of
 from .results.solution import Solution
@@ -27,8 +22,6 @@ from .scene.bodies import check_geometry, without_unloaded
 from .scene.scene import build_scene
 
 _LOG = logging.getLogger(__name__)
-# Forces below this fraction of the largest one are shown as zero.
-_NOISE = 1e-10
 
 
 def simulate(
@@ -43,11 +36,23 @@ def simulate(
     case and its mesh do not fit, SolveError where no solution is found.
     """
     started, clock = processor_time(), clock or Clock()
-    solution = solve_problem(assembled(case, mesh, options, clock), clock)
+    solution = solved(case, mesh, options, clock)
     if solution.ended:
         raise SolveError(solution.ended)
     solution.cpu_seconds = processor_time() - started
     return solution
+
+
+def solved(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> Solution:
+    """Solve a case on its mesh: all steps on the mesh as given, or each where its bodies are.
+
+    Raises as `simulate` does; where a later step has no solution, see `solve_problem`.
+    """
+    if case.moving:
+        from .motion import solve_moving
+
+        return solve_moving(case, mesh, options, clock)
+    return solve_problem(assembled(case, mesh, options, clock), clock)
 
 
 def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
@@ -64,34 +69,24 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     with stage(clock, "solve"):
         for factor, step in zip(case.factors, case.steps, strict=True):
             try:
-                state, field = _solved(problem, step, states)
+                state, field = _of_step(problem, step, states)
             except SolveError as error:
-                ended = f"{_called(step, factor)}: {error}" if len(case.steps) > 1 else str(error)
+                ended = f"{called(step, factor)}: {error}" if len(case.steps) > 1 else str(error)
                 if not states:
                     raise SolveError(ended) from None
                 problem.scene = replace(scene, case=case.until(len(states)))
                 break
             states.append(state)
             fields.append(field)
-            closed = int(state.status.closed[: scene.n_multipliers].sum())
-            count = state.status.iterations
-            values = _called(step, factor), count, "s" * (count != 1), closed, state.residual
-            _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
+            tell(called(step, factor), state, scene.n_multipliers)
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
         solution = solution_of(problem, states, fields, plan)
         solution.validity = validity(problem, states)
-    _log_forces(solution)
-    solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
-    solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
-    solution.ended = ended
-    if fault := inconsistency(solution):
-        raise SolveError(f"the solve came to no sound end: {fault}")
-    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
-    return solution
+    return finished(solution, clock, ended)
 
 
-def _solved(
+def _of_step(
     problem: ContactProblem, step: Step, states: list[Equilibrium]
 ) -> tuple[Equilibrium, Recovered]:
     """A step after those solved, and its recovered pressure."""
@@ -124,51 +119,3 @@ def assembled(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> 
             _LOG.log(OUTCOME, text, zone.zone.name, gaps.min(), gaps.max())
     with stage(clock, "assembly"):
         return ContactProblem(scene)
-
-
-def _log_forces(solution: Solution) -> None:
-    """Log the forces of each step, and the largest displacement and strain of the last."""
-    if units := solution.case.units:
-        _LOG.log(OUTCOME, "numbers in %s", " and ".join(units.values()))
-    shown = partial(_without_noise, float(np.ptp(solution.mesh.points, axis=0).max()))
-    for step, given in zip(solution.steps, solution.case.steps, strict=True):
-        of_step = f"{_called(given, step.factor)}, " if len(solution.steps) > 1 else ""
-        forces = [one.force for one in step.resultants.values()]
-        forces += [one.force for one in step.reactions] + [one.force for one in step.rigid]
-        most = max((float(np.abs(force).max()) for force in forces), default=0.0)
-        for name, contact in step.resultants.items():
-            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(most, contact))
-        if solution.case.frictional:
-            _LOG.log(OUTCOME, "%swork of friction %.6g", of_step, step.dissipation)
-        for reaction in step.reactions:
-            text = "%sreaction of %s: %s"
-            _LOG.log(OUTCOME, text, of_step, reaction.group, shown(most, reaction))
-        for body in step.rigid:
-            text = "%scontact on rigid body %s: %s"
-            _LOG.log(OUTCOME, text, of_step, body.body, shown(most, body))
-    for name, probe in solution.probes.items():
-        for line in probe.lines():
-            _LOG.log(OUTCOME, "probe %s %s", name, line)
-    largest, place = solution.largest_displacement
-    at = ", ".join(f"{x:.5g}" for x in place)
-    values = largest, at, solution.validity.strain, solution.strain_energy
-    text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
-    _LOG.log(OUTCOME, text, *values)
-
-
-def _without_noise(length: float, most: float, found: Any) -> Any:
-    """A resultant without the round-off beside `most`, the largest force, and its moments."""
-    force, moment = found.force, found.moment
-    return replace(
-        found,
-        force=np.where(np.abs(force) < _NOISE * most, 0.0, force),
-        moment=np.where(np.abs(moment) < _NOISE * most * length, 0.0, moment),
-    )
-
-
-def _called(step: Step, factor: float) -> str:
-    if not isinstance(step, dict):
-        return f"load factor {factor:g}"
-    if all(name.startswith(STATE) for name in step):
-        return f"step {factor:g}"
-    return f"step {factor:g} ({', '.join(f'{name} {value:g}' for name, value in step.items())})"

@@ -1,6 +1,7 @@
 """The result file: one HDF5 file that is also a VTKHDF grid, written whole or not at all.
 
-`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells; the file has everything else
+`/VTKHDF` is the cut mesh with the slave sub-faces appended as cells, where bodies move far at all
+positions, which ParaView plays; the file has everything else
 that the checks need, so that it can be judged without solving:
 
     /case          source text, name, family, path, swapped, hexahedra, recovery
@@ -32,8 +33,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +43,19 @@ import numpy as np
 from ..case.model import Case
 from ..case.reader import parse_case
 from ..lac.cells.catalogue import cell_type
-from ..mesh.files.vtkhdf import check_name, new_file, read_grid, read_table, write_grid, write_table
+from ..mesh.files.vtkhdf import (
+    Earlier,
+    check_name,
+    new_file,
+    read_earlier,
+    read_grid,
+    read_table,
+    write_grid,
+    write_table,
+)
 from ..simulation.judgement.consistency import inconsistency
-from ..simulation.results.solution import BodyInfo, Line, Solution, Validity, ZoneResult
+from ..simulation.results.fields import grid_fields, grid_of
+from ..simulation.results.solution import BodyInfo, Line, Position, Solution, Validity
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
 from .steps import read_probes, read_steps, read_zone, write_probes, write_steps, write_zone
@@ -67,13 +76,6 @@ _SCALARS = (
     "peak_memory_mb",
     "ended",
 )
-_ON_FACES = {
-    "pressure": "multiplier",
-    "gap": "gap",
-    "status": "shown_status",
-    "coverage": "coverage",
-    "pressure_error_estimate": "pressure_error_estimate",
-}
 
 
 @dataclass
@@ -214,6 +216,8 @@ def _read_solution(file: h5py.File) -> Solution:
         errors=_plain(file["errors"].attrs),
         seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
         stage_cpu_seconds=dict(_read_pairs(file["timings"], "stage", "cpu_seconds")),
+        motion=point_data["motion"][:, : grid.points.shape[1]] if "motion" in point_data else None,
+        earlier=[Position(*one) for one in read_earlier(file[GRID])],
         **{key: scalars[key] for key in _SCALARS},
     )
 
@@ -223,75 +227,9 @@ def _read_solution(file: h5py.File) -> Solution:
 
 def _write_grid(group: h5py.Group, solution: Solution) -> None:
     """The volume cells, then the sub-faces of all zones, one block for each cell type."""
-    mesh, dim = solution.mesh, solution.mesh.points.shape[1]
-    volumes = [i for i, block in enumerate(mesh.cells) if block.dim == dim]
-    faces, cell_data = _face_blocks(solution)
-    cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
-    n_volumes = sum(len(data) for _, data in cells)
-    for name, values in cell_data.items():
-        nothing = np.nan if values.dtype.kind == "f" else -1
-        none_there = np.full((n_volumes, *values.shape[1:]), nothing)
-        cell_data[name] = np.concatenate([none_there, values])
-    none = [np.empty(0, dtype=int)] * len(faces)
-    sets = {name: [of[i] for i in volumes] + none for name, of in mesh.cell_sets.items()}
-    point_data = {
-        "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
-        "stress": solution.stress,
-        "normal_stress": solution.nodal_normal_stress,
-        "body": solution.body,
-    }
-    if solution.reaction is not None:
-        point_data["reaction"] = np.pad(solution.reaction, ((0, 0), (0, 3 - dim)))
-    if any(zone.recovered for zone in solution.zones):
-        point_data["recovered_pressure"] = _recovered_at_nodes(solution)
-    write_grid(
-        group, meshio.Mesh(mesh.points, cells + faces, cell_sets=sets), point_data, cell_data
-    )
-
-
-def _recovered_at_nodes(solution: Solution) -> np.ndarray:
-    """The recovered pressure (n,) at slave nodes, NaN at all others."""
-    values = np.full(len(solution.mesh.points), np.nan)
-    for zone in solution.zones:
-        if zone.recovered:
-            values[zone.recovered.nodes] = zone.recovered.at_nodes
-    return values
-
-
-def _face_blocks(
-    solution: Solution,
-) -> tuple[list[tuple[str, np.ndarray]], dict[str, np.ndarray]]:
-    """The sub-faces of all zones, a block for each cell type, and the data of these cells."""
-    parts = [
-        (kind, connectivity, owner, number)
-        for number, zone in enumerate(solution.zones)
-        for kind, connectivity, owner in zone.faces
-    ]
-    parts.sort(key=itemgetter(0))  # stable: the zones of a block stay in their order
-    blocks = [
-        (cell_type(kind).meshio, np.concatenate([part[1] for part in same]))
-        for kind, same in groupby(parts, key=itemgetter(0))
-    ]
-    none = np.empty(0, dtype=int)
-    data = {
-        "macro_element": np.concatenate([none, *(owner for _, _, owner, _ in parts)]),
-        "zone": np.concatenate([none, *(np.full(len(o), number) for _, _, o, number in parts)]),
-    }
-    for name, attribute in _ON_FACES.items():
-        values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
-        data[name] = np.concatenate([np.empty(0), *values]).astype(float)
-    if solution.case.frictional:
-        for name in ("friction_traction", "slip", "slip_total"):
-            values = [_of_friction(solution.zones[n], name)[owner] for _, _, owner, n in parts]
-            data[name] = np.concatenate(values)
-    return blocks, data
-
-
-def _of_friction(zone: ZoneResult, name: str) -> np.ndarray:
-    """A vector (m, 3) of friction; zero in a zone without."""
-    m, dim = zone.centre.shape
-    values = np.zeros((m, dim)) if zone.friction is None else getattr(zone.friction, name)
-    return np.pad(values, ((0, 0), (0, 3 - dim)))
+    grid, (points, cells) = grid_of(solution), grid_fields(solution)
+    steps = [step.factor for step in solution.steps] if solution.earlier else []
+    write_grid(group, grid, points, cells, Earlier(steps, solution.earlier))
 
 
 def _sub_faces(

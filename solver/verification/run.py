@@ -20,7 +20,7 @@ from ..mesh.size import check_memory, of_mesh
 from ..mesh.tidy import tidy
 from ..simulation.options import LEAN, Options
 from ..simulation.results.solution import Solution
-from ..simulation.simulate import assembled, solve_problem
+from ..simulation.simulate import solved
 from ..system.errors import InputError, MachineError, of_machine
 from ..system.files import hash_of, last_line
 from ..system.progress import OUTCOME, Clock, processor_time, stage
@@ -134,7 +134,7 @@ def solve(
             output.parent.mkdir(parents=True, exist_ok=True)
         mesh = _mesh_of(job, case, clock)
         options = Options.everything() if job.everything else LEAN
-        solution = solve_problem(assembled(case, mesh, options, clock), clock)
+        solution = solved(case, mesh, options, clock)
         with stage(clock, "checks"):  # accepted values belong to the case's own mesh
             checks = checked(solution, job.refine == 1 and not solution.ended)
         solution.cpu_seconds = processor_time() - started

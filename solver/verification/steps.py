@@ -28,7 +28,8 @@ _OBSERVED = ("pressure", "gap", "status", "coverage")
 
 def write_steps(file: h5py.File, steps: Sequence[StepResult]) -> None:
     """The cost of every step, its forces, and what was observed (steps, observed places)."""
-    rows = [{name: getattr(step, name) for name in _OF_STEP} for step in steps]
+    names = (*_OF_STEP, "work") if any(step.work for step in steps) else _OF_STEP
+    rows = [{name: getattr(step, name) for name in names} for step in steps]
     observed = [step.observations for step in steps]
     write_table(file.create_group("steps"), rows)
     for name in ("reactions", "rigid"):

@@ -74,9 +74,9 @@ class CoulombContact:
     def solve(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Forces λ (r,), jumps z (r,) and the iterations, for λ₀ = `forces` (r,); None where none.
 
-        From z = 0 by plain steps, else with a line search. Where μ is above 1 there may be several
-        states: then also from where all is closed and slips, and the state in which most of the
-        contact stays closed is taken.
+        From z = 0 by plain steps, else from where all is closed and slips, as after a long way,
+        else with a line search. Where μ is above 1 there may be several states: then from both, and
+        the state in which most of the contact stays closed is taken.
 
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
@@ -90,7 +90,7 @@ class CoulombContact:
         size = np.abs(forces).max(initial=0.0) or 1.0
         start, rest = forces / size, np.zeros(len(forces))
         found = [self._newton(rest, start, False)]
-        if self.friction.max(initial=0.0) > UNIQUE:
+        if self.friction.max(initial=0.0) > UNIQUE or not found[0]:
             found.append(self._newton(self._sliding(start), start, False))
         if not any(found):
             found = [self._newton(rest, start, True)]

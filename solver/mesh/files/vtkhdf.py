@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import meshio
@@ -63,6 +63,18 @@ def read_table(group: h5py.Group) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
+class Earlier(NamedTuple):
+    """Positions before that of a grid: points (n, dim), and fields as the grid has them.
+
+    `times` (s,) of all positions, the grid's own as the last.
+    """
+
+    times: Sequence[float]
+    positions: Sequence[tuple[np.ndarray, Mapping[str, np.ndarray], Mapping[str, np.ndarray]]]
+
+
+ALONE = Earlier((), ())
+"""No position before that of a grid."""
 _BY_VTK = {cell.vtk: cell for cell in BY_NAME.values()}
 _GROUPS = "mesh_groups"
 
@@ -72,11 +84,13 @@ def write_grid(
     mesh: meshio.Mesh,
     point_data: Mapping[str, np.ndarray],
     cell_data: Mapping[str, np.ndarray],
+    earlier: Earlier = ALONE,
 ) -> None:
     """Write the grid into `group` (named VTKHDF for ParaView), its groups beside it.
 
     point_data (n_points, …) and cell_data (n_cells, …), cells counted block after block. Points of
-    a 2D mesh get z = 0; the attribute `Dimension` has the dimension.
+    a 2D mesh get z = 0; the attribute `Dimension` has the dimension. Points and fields of `earlier`
+    positions stand before those of the grid, on the same cells.
     """
     group.attrs["Version"] = np.array([2, 0], dtype=np.int64)
     grid = b"UnstructuredGrid"
@@ -86,12 +100,13 @@ def write_grid(
     cells = [(cell_type(block.type), block.data) for block in mesh.cells]
     sizes = np.repeat([cell.n_nodes for cell, _ in cells], [len(nodes) for _, nodes in cells])
     flat = [nodes.ravel() for _, nodes in cells]
-    points = np.zeros((len(mesh.points), 3))
-    points[:, :dim] = mesh.points
+    all_points = [*(one[0] for one in earlier.positions), mesh.points]
+    points = np.pad(np.concatenate(all_points), ((0, 0), (0, 3 - dim)))
+    steps = len(all_points)
     arrays = {
-        "NumberOfPoints": np.array([len(points)]),
-        "NumberOfCells": np.array([len(sizes)]),
-        "NumberOfConnectivityIds": np.array([sizes.sum()]),
+        "NumberOfPoints": np.array([len(mesh.points)] * steps),
+        "NumberOfCells": np.array([len(sizes)] * steps),
+        "NumberOfConnectivityIds": np.array([sizes.sum()] * steps),
         "Points": points,
         "Connectivity": np.concatenate(flat).astype(np.int64),
         "Offsets": np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
@@ -99,11 +114,45 @@ def write_grid(
     }
     for name, array in arrays.items():
         group.create_dataset(name, data=array)
-    for kind, data in (("PointData", point_data), ("CellData", cell_data)):
+    for which, (kind, data) in enumerate((("PointData", point_data), ("CellData", cell_data)), 1):
         folder = group.create_group(kind)
         for name, array in data.items():
-            folder.create_dataset(name, data=array)
+            whole = [*(one[which][name] for one in earlier.positions), array]
+            folder.create_dataset(name, data=np.concatenate(whole) if len(whole) > 1 else array)
+    if earlier.positions:
+        _write_times(group.create_group("Steps"), earlier.times, len(mesh.points), len(sizes))
     _write_groups(group.parent.create_group(_GROUPS), mesh)
+
+
+def _write_times(folder: h5py.Group, times: Sequence[float], points: int, cells: int) -> None:
+    """Where each position begins; all have the same cells (VTKHDF 2.0, temporal data)."""
+    count = np.arange(len(times))
+    folder.attrs["NSteps"] = len(times)
+    folder["Values"] = np.array(times, dtype=float)
+    folder["PartOffsets"], folder["NumberOfParts"] = count, np.ones_like(count)
+    folder["PointOffsets"] = count * points
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        folder[name] = np.zeros((len(times), 1), dtype=np.int64)
+    grid = folder.parent
+    for kind, size in (("PointData", points), ("CellData", cells)):
+        for name in grid[kind]:
+            folder[f"{kind}Offsets/{name}"] = count * size
+
+
+def read_earlier(
+    group: h5py.Group,
+) -> list[tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]]:
+    """Points and fields of the positions before that of a grid."""
+    dim, found = int(group.attrs["Dimension"]), []
+    points, cells = (int(group[f"NumberOf{name}"][0]) for name in ("Points", "Cells"))
+    for step in range(len(group["NumberOfPoints"]) - 1):
+        rows = {
+            "PointData": slice(step * points, (step + 1) * points),
+            "CellData": slice(step * cells, (step + 1) * cells),
+        }
+        data = ({n: d[of] for n, d in group[kind].items()} for kind, of in rows.items())
+        found.append((group["Points"][rows["PointData"], :dim], *data))
+    return found
 
 
 def read_cells(group: h5py.Group) -> tuple[list[tuple[str, np.ndarray]], list[tuple[int, int]]]:
@@ -127,7 +176,7 @@ def read_cells(group: h5py.Group) -> tuple[list[tuple[str, np.ndarray]], list[tu
 
 
 def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
-    """The mesh of a grid that `write_grid` wrote, its point data and its cell data."""
+    """The mesh of a grid that `write_grid` wrote at its last position, and its fields."""
     dim = int(group.attrs["Dimension"])
     cells, bounds = read_cells(group)
     cell_sets, point_sets = {}, {}
@@ -139,8 +188,11 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
         ]
     for name, ids in groups["nodes"].items():
         point_sets[_plain(name)] = ids[()]
-    mesh = meshio.Mesh(group["Points"][:, :dim], cells, cell_sets=cell_sets, point_sets=point_sets)
-    data = ({n: d[()] for n, d in group[kind].items()} for kind in ("PointData", "CellData"))
+    count = {"PointData": -int(group["NumberOfPoints"][-1]), "CellData": -bounds[-1][1]}
+    points = group["Points"][count["PointData"] :, :dim]
+    mesh = meshio.Mesh(points, cells, cell_sets=cell_sets, point_sets=point_sets)
+    # Fields of earlier positions stand first.
+    data = ({n: d[of:] for n, d in group[kind].items()} for kind, of in count.items())
     return mesh, *data
 
 

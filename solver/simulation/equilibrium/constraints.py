@@ -67,8 +67,11 @@ class ContactConstraints:
         return np.flatnonzero(self.eligible)[~found]
 
 
-def contact_constraints(scene: Scene) -> ContactConstraints:
-    """Those of all zones; raises InputError where a zone cannot be in contact."""
+def contact_constraints(scene: Scene, carried: np.ndarray | None = None) -> ContactConstraints:
+    """Those of all zones; raises InputError where a zone cannot be in contact.
+
+    `carried` (n_dofs,): a displacement that slips count beside that of the solve.
+    """
     operators = [zone.operator for zone in scene.zones]
     empty = sparse.csr_matrix((0, scene.n_dofs))
     slips = [row for o in operators for row in o.slip]
@@ -82,7 +85,7 @@ def contact_constraints(scene: Scene) -> ContactConstraints:
         for k in ("initial", "area", "covered")
     )
     normal = np.arange(len(area)) < scene.n_multipliers
-    initial = np.where(normal, initial, 0.0)
+    initial = np.where(normal, initial, 0.0 if carried is None else gaps @ carried)
     unloaded = np.zeros(len(area), dtype=bool)
     unloaded[normal] = scene.rest.unloaded_multipliers
     touching = covered / area > MIN_COVERAGE

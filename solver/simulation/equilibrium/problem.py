@@ -62,10 +62,13 @@ _AT_ONCE = 1 << 23
 class ContactProblem:
     """Stiffness and contact constraints of a scene, with the factors kept between solves."""
 
-    def __init__(self, scene: Scene):
-        """Assemble; raises InputError where nothing can hold a body or a macro-element's node."""
+    def __init__(self, scene: Scene, carried: np.ndarray | None = None):
+        """Assemble; raises InputError where nothing can hold a body or a macro-element's node.
+
+        `carried` (n_dofs,): a displacement that slips count beside that of the solve.
+        """
         self.scene = scene
-        self.constraints = contact_constraints(scene)
+        self.constraints = contact_constraints(scene, carried)
         motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         self._motions = RigidMotions.of(scene, self.constraints, motions)
         self._moves: dict[bytes, str] = {}

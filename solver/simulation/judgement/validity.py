@@ -316,7 +316,7 @@ def limits_passed(case: Case, found: Validity) -> list[str]:
     if found.slip > _SMALL_SLIP:
         reasons.append(
             f"contact slides by {found.slip:.2g} of a face: above {_SMALL_SLIP:g} the faces that "
-            "were paired are no longer opposite each other"
+            "were paired are no longer opposite each other (`motion: large` follows them)"
         )
     if found.pushed_past:
         reasons.append(

@@ -221,7 +221,8 @@ class StepResult:
     `observations` holds one mapping per observed macro-element, in the order of the case file:
     zone, macro_element (number), pressure, gap, status (0 or 1), coverage. `resultants` of contact
     by zone, `reactions` and motions of `rigid` bodies.
-    `dissipation`: the work of friction in the step.
+    `dissipation`: the work of friction in the step; `work`: that of loads and of what holds the
+    bodies, where these may move far.
     """
 
     factor: float
@@ -234,6 +235,18 @@ class StepResult:
     reactions: list[Reaction] = field(default_factory=list)
     rigid: list[RigidMotion] = field(default_factory=list)
     dissipation: float = 0.0
+    work: float = 0.0
+
+
+class Position(NamedTuple):
+    """A position on the path of bodies that move far: points (n, dim), and the fields there.
+
+    `at_points` and `of_cells` are those of the grid of a result file, by name.
+    """
+
+    points: np.ndarray
+    at_points: dict[str, np.ndarray]
+    of_cells: dict[str, np.ndarray]
 
 
 @dataclass
@@ -253,6 +266,8 @@ class Solution:
     nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
     `acted`: nodes by the key of the support, or of the load on a surface.
     `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
+    Where bodies may move far, `mesh` is where the last step brought them, `displacement` is what
+    they have beside their `motion` (n, dim), and `earlier` has the positions of the steps before.
     `ended`: why the step after the last one has no solution; `case` then has the steps before.
     `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
     the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
@@ -292,6 +307,8 @@ class Solution:
     cpu_seconds: float = float("nan")
     peak_memory_mb: float = float("nan")
     ended: str = ""
+    motion: np.ndarray | None = None
+    earlier: list[Position] = field(default_factory=list)
 
     @property
     def swapped(self) -> bool:

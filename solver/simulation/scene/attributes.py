@@ -33,7 +33,9 @@ from .holdings import holdings_of
 from .holdings.holding import Holding
 
 if TYPE_CHECKING:
+    from ...mechanics.mortar.quadric import Quadric
     from .holdings.rigid import Frame
+    from .parts.springs import Springs
 
 
 class Attributes(CutGroups):
@@ -110,6 +112,20 @@ class Attributes(CutGroups):
                 values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
         return found
 
+    def springs(self) -> Springs:
+        """The springs to the ground and elastic foundations."""
+        from .parts.springs import springs_of
+
+        return springs_of(self)
+
+    def surface(self, name: str) -> Quadric | None:
+        """The surface of a body, where it is a rigid one that the case gives."""
+        if name not in self.case.rigid:
+            return None
+        from .holdings.rigid_surfaces import quadric_of
+
+        return quadric_of(self.case, name, self.origin)
+
     @cached_property
     def holdings(self) -> list[Holding]:
         """What holds and joins the bodies."""
@@ -161,7 +177,7 @@ class Attributes(CutGroups):
         total = sum((holding.force(name) for holding in self.holdings), np.zeros_like(self.points))
         for i, load in enumerate(self.case.loads):
             if name in (None, load.name):
-                total += self._force(load, f"loads[{i}].group")
+                total += self.force_of(load, f"loads[{i}].group")
         return total
 
     def histories(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -180,7 +196,8 @@ class Attributes(CutGroups):
     def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         return self.forces(name), self.supports(name).offset
 
-    def _force(self, load: Load, key: str) -> np.ndarray:
+    def force_of(self, load: Load, key: str) -> np.ndarray:
+        """Nodal forces (n, dim) of a load under a key, at load factor 1; 0 of those of parts."""
         total = np.zeros_like(self.points)
         if isinstance(load.value, dict):
             return total  # see `initial`

@@ -135,6 +135,10 @@ class CutGroups:
 
         return value
 
+    def carried(self, name: str, point: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """Where a point (dim,) of the mesh as given, which moves with a rigid body, is now."""
+        return point
+
     @cached_property
     def body(self) -> np.ndarray:
         """The body (n,) of each node."""

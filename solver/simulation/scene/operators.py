@@ -52,7 +52,7 @@ def operator_of(
     scheme = scheme_of(zone.treatment, zone.points)
     closure = scheme.closure and options.safeguards.closure
     scheme = replace(scheme, closure=closure, slip=zone.friction > 0)
-    if surface := _surface_of(groups, zone):
+    if surface := groups.surface(zone.master):
         masters = [frame(points, groups.nodes(zone.master, "contact"))]
         if zone.normal == "master":
             slaves = with_directions(slaves, -surface.gradient(points))
@@ -68,15 +68,6 @@ def operator_of(
     asked = _recovery(groups, zone, faces.slave_faces) if scheme.space is constants else None
     operator = gap_operator(slaves, masters, count, len(points), None, scheme, asked)
     return replace(operator, initial=_initial_gaps(zone, operator, groups, faces.sub_faces, noise))
-
-
-def _surface_of(groups: Attributes, zone: Zone) -> Quadric | None:
-    """The rigid surface without a mesh that is the master, if it is one."""
-    if zone.master not in groups.case.rigid:
-        return None
-    from .holdings.rigid_surfaces import quadric_of
-
-    return quadric_of(groups.case, zone.master, groups.origin)
 
 
 def _without_segments(scheme: Scheme, surface: Quadric) -> Scheme:

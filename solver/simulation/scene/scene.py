@@ -198,20 +198,45 @@ class Scene:
         return len(self.rest.unloaded_multipliers)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A case on its mesh, cut but not paired: what is the same wherever its bodies are.
+
+    `surfaces`: slave faces as meshed and master faces of each zone; for the rest see `Scene`.
+    """
+
+    groups: Attributes
+    options: Options
+    given: GivenMesh
+    surfaces: Surfaces
+    length: float
+    rounding: float
+
+    @property
+    def contact_faces(self) -> list[FaceBlock]:
+        """The faces of all contact surfaces."""
+        return [block for pair in self.surfaces for side in pair for block in side]
+
+
 def build_scene(
     case: Case, mesh: meshio.Mesh, options: Options = LEAN, clock: Clock | None = None
 ) -> Scene:
     """The discrete problem of a case; raises InputError where case and mesh do not fit."""
-    clock, safeguards = clock or Clock(), options.safeguards
+    clock = clock or Clock()
+    model = build_model(case, mesh, options, clock)
+    return scene_of(model, model.groups, clock)
+
+
+def build_model(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> Model:
+    """The cut mesh of a case and its groups; raises InputError where case and mesh do not fit."""
     mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, unnamed = named_parts(case, mesh)
-    origin = mesh.points.mean(axis=0) * safeguards.local_coordinates
+    origin = mesh.points.mean(axis=0) * options.safeguards.local_coordinates
     if case.axisymmetric:
         mesh = replace_points(mesh, radial(mesh.points))
         origin[0] = 0.0
     local = replace_points(mesh, mesh.points - origin)
-    rounding = float(np.finfo(float).eps * np.abs(mesh.points).max())
     with stage(clock, "cut"):
         surfaces = surfaces_of(case, local)
         refuse_bent(case, local.points, surfaces)
@@ -220,21 +245,38 @@ def build_scene(
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
-    # The master surface of a zone may be the slave surface of another, and cut.
-    surfaces = [(slave, groups.as_cut(master)) for slave, master in surfaces]
+    return Model(
+        groups=groups,
+        options=options,
+        given=GivenMesh(
+            cells=volume_cells(mesh),
+            groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
+            unnamed=unnamed,
+        ),
+        # The master surface of a zone may be the slave surface of another, and cut.
+        surfaces=[(slave, groups.as_cut(master)) for slave, master in surfaces],
+        length=float(np.ptp(local.points, axis=0).max()),
+        rounding=float(np.finfo(float).eps * np.abs(mesh.points).max()),
+    )
+
+
+def scene_of(model: Model, groups: Attributes, clock: Clock) -> Scene:
+    """The discrete problem of a model with its `groups` where they are."""
+    case, options, surfaces = groups.case, model.options, model.surfaces
+    safeguards = options.safeguards
     with stage(clock, "pairing"):
-        noise = _GAP_ROUND_OFF * rounding * safeguards.gap_threshold
+        noise = _GAP_ROUND_OFF * model.rounding * safeguards.gap_threshold
         operators = [
             operator_of(groups, zone, faces, master, noise, options)
-            for zone, faces, (_, master) in zip(case.zones, cut_zones, surfaces, strict=True)
+            for zone, faces, (_, master) in zip(case.zones, groups.zones, surfaces, strict=True)
         ]
     with stage(clock, "assembly"):
         blocks = groups.elasticity(options.shortcuts.quadrature)
         blocks, parts = parts_of(groups, blocks, safeguards.mixed)
         free, force = groups.supports(), groups.forces()
-        zones = _zones(case, cut_zones, surfaces, operators, free)
-        slave = np.zeros(len(cut_mesh.points), dtype=bool)
-        for block in (block for faces in sub_faces for block in faces):
+        zones = _zones(case, groups.zones, surfaces, operators, free)
+        slave = np.zeros(len(groups.points), dtype=bool)
+        for block in (block for zone in groups.zones for block in zone.sub_faces):
             slave[block.nodes] = True
         free = with_contact_frames(free, operators, slave)
     n_bodies = int(groups.body.max()) + 1
@@ -242,16 +284,12 @@ def build_scene(
     return Scene(
         case=case,
         options=options,
-        given=GivenMesh(
-            cells=volume_cells(mesh),
-            groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
-            unnamed=unnamed,
-        ),
-        origin=origin,
-        length=float(np.ptp(local.points, axis=0).max()),
-        rounding=rounding,
-        points=cut_mesh.points,
-        mesh=cut_mesh,
+        given=model.given,
+        origin=groups.origin,
+        length=model.length,
+        rounding=model.rounding,
+        points=groups.points,
+        mesh=groups.cut,
         body=groups.body,
         blocks=blocks,
         parts=parts,

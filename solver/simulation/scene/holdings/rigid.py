@@ -110,9 +110,10 @@ def _frame(groups: CutGroups, name: str) -> Frame:
     body, nodes = groups.case.rigid[name], groups.nodes(name, f"bodies.{name}")
     places = groups.points[nodes]
     if body.reference is not None:
-        point = np.array(body.reference) - groups.origin
+        point = groups.carried(name, np.array(body.reference) - groups.origin)
     elif body.surface:
-        point = np.array(body.values[MIDDLE[body.surface]]) - groups.origin
+        given = np.array(body.values[MIDDLE[body.surface]])
+        point = groups.carried(name, given - groups.origin)
     else:
         faces = face_nodes(groups.mesh, name)
         own = groups.points[faces] if len(faces) else places

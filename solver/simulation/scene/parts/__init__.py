@@ -31,9 +31,7 @@ def parts_of(
     """
     case, parts, strain = groups.case, list[ModelPart](), None
     if any(support.spring for support in case.supports):
-        from .springs import springs_of
-
-        parts.append(springs_of(groups))
+        parts.append(groups.springs())
     if any(load.strains for load in case.loads):
         from .strain import StrainFields
 

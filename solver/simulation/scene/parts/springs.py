@@ -20,18 +20,19 @@ class _SpringTerm(Term):
 
 
 class Springs(ModelPart):
-    """Springs of a stiffness (n_dofs, n_dofs) that hold bodies of `shape` (n, dim)."""
+    """Springs of a stiffness (n_dofs, n_dofs), drawn by `drawn` (n, dim) beside displacements."""
 
     holder = "springs"
 
-    def __init__(self, stiffness: sparse.csr_matrix, shape: tuple[int, ...]):
-        self.stiffness, self._shape = stiffness, shape
+    def __init__(self, stiffness: sparse.csr_matrix, drawn: np.ndarray):
+        self.stiffness, self._drawn = stiffness, drawn
         self.diagonal = stiffness.diagonal()
         self.resisting = _rows(stiffness)
 
     def term(self, displacement: Displacement, inner: None) -> Term:  # noqa: ARG002
         """Their forces."""
-        return _SpringTerm((self.stiffness @ displacement.total).reshape(self._shape))
+        drawn = displacement.total + self._drawn.ravel()
+        return _SpringTerm((self.stiffness @ drawn).reshape(self._drawn.shape))
 
 
 def springs_of(groups: CutGroups) -> Springs:
@@ -42,7 +43,7 @@ def springs_of(groups: CutGroups) -> Springs:
             total = total + _spring(
                 groups, support.group, direction, value, f"supports[{i}].spring.{direction}"
             )
-    return Springs(total, groups.points.shape)
+    return Springs(total, np.zeros_like(groups.points))
 
 
 def _spring(

@@ -1,0 +1,98 @@
+"""The end of a solve: what it tells, its last remarks, and whether its fields are sound."""
+
+import logging
+import resource
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..case.acting import Step
+from ..case.model import STATE
+from ..lac.errors import SolveError
+from ..system.process import peak_mb
+from ..system.progress import OUTCOME, Clock
+from .equilibrium.state import Equilibrium
+from .judgement.consistency import inconsistency
+from .judgement.plan import estimated, softness_notes
+from .judgement.validity import remarks
+from .results.solution import Solution
+
+_LOG = logging.getLogger(__name__)
+# Forces below this fraction of the largest one are shown as zero.
+_NOISE = 1e-10
+# The factors of so many names are told.
+_FEW = 6
+
+
+def finished(solution: Solution, clock: Clock, ended: str) -> Solution:
+    """The solution with its last remarks and its times; SolveError where it is not sound.
+
+    `ended`: why the step after its last one has no solution; empty where all have one.
+    """
+    _log_forces(solution)
+    solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
+    solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
+    solution.ended = ended
+    if fault := inconsistency(solution):
+        raise SolveError(f"the solve came to no sound end: {fault}")
+    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
+    return solution
+
+
+def tell(step: str, state: Equilibrium, n_multipliers: int) -> None:
+    """Log how a step was solved."""
+    closed = int(state.status.closed[:n_multipliers].sum())
+    count = state.status.iterations
+    values = step, count, "s" * (count != 1), closed, state.residual
+    _LOG.log(OUTCOME, "%s: %d iteration%s, %d closed, residual %.1e", *values)
+
+
+def _log_forces(solution: Solution) -> None:
+    """Log the forces of each step, and the largest displacement and strain of the last."""
+    if units := solution.case.units:
+        _LOG.log(OUTCOME, "numbers in %s", " and ".join(units.values()))
+    shown = partial(_without_noise, float(np.ptp(solution.mesh.points, axis=0).max()))
+    for step, given in zip(solution.steps, solution.case.steps, strict=True):
+        of_step = f"{called(given, step.factor)}, " if len(solution.steps) > 1 else ""
+        forces = [one.force for one in step.resultants.values()]
+        forces += [one.force for one in step.reactions] + [one.force for one in step.rigid]
+        most = max((float(np.abs(force).max()) for force in forces), default=0.0)
+        for name, contact in step.resultants.items():
+            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(most, contact))
+        if solution.case.frictional:
+            _LOG.log(OUTCOME, "%swork of friction %.6g", of_step, step.dissipation)
+        for reaction in step.reactions:
+            text = "%sreaction of %s: %s"
+            _LOG.log(OUTCOME, text, of_step, reaction.group, shown(most, reaction))
+        for body in step.rigid:
+            text = "%scontact on rigid body %s: %s"
+            _LOG.log(OUTCOME, text, of_step, body.body, shown(most, body))
+    for name, probe in solution.probes.items():
+        for line in probe.lines():
+            _LOG.log(OUTCOME, "probe %s %s", name, line)
+    largest, place = solution.largest_displacement
+    at = ", ".join(f"{x:.5g}" for x in place)
+    values = largest, at, solution.validity.strain, solution.strain_energy
+    text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
+    _LOG.log(OUTCOME, text, *values)
+
+
+def _without_noise(length: float, most: float, found: Any) -> Any:
+    """A resultant without the round-off beside `most`, the largest force, and its moments."""
+    force, moment = found.force, found.moment
+    return replace(
+        found,
+        force=np.where(np.abs(force) < _NOISE * most, 0.0, force),
+        moment=np.where(np.abs(moment) < _NOISE * most * length, 0.0, moment),
+    )
+
+
+def called(step: Step, factor: float) -> str:
+    """A step in words."""
+    if not isinstance(step, dict):
+        return f"load factor {factor:g}"
+    if len(step) > _FEW or all(name.startswith(STATE) for name in step):
+        return f"step {factor:g}"
+    return f"step {factor:g} ({', '.join(f'{name} {value:g}' for name, value in step.items())})"

@@ -1,0 +1,101 @@
+"""The fields of a solution on its grid: the cells of the cut mesh, then the slave sub-faces."""
+
+from itertools import groupby
+from operator import itemgetter
+
+import meshio
+import numpy as np
+
+from ...lac.cells.catalogue import cell_type
+from .solution import Solution, ZoneResult
+
+_ON_FACES = {
+    "pressure": "multiplier",
+    "gap": "gap",
+    "status": "shown_status",
+    "coverage": "coverage",
+    "pressure_error_estimate": "pressure_error_estimate",
+}
+
+
+def grid_of(solution: Solution) -> meshio.Mesh:
+    """The volume cells, then the sub-faces of all zones, one block for each cell type."""
+    mesh = solution.mesh
+    volumes, faces = _volumes(solution), _face_blocks(solution)[0]
+    cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
+    none = [np.empty(0, dtype=int)] * len(faces)
+    sets = {name: [of[i] for i in volumes] + none for name, of in mesh.cell_sets.items()}
+    return meshio.Mesh(mesh.points, cells + faces, cell_sets=sets)
+
+
+def grid_fields(solution: Solution) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """The fields at points (n, …) and of cells (n_cells, …); those of contact on faces alone."""
+    mesh, dim = solution.mesh, solution.mesh.points.shape[1]
+    cell_data = _face_blocks(solution)[1]
+    n_volumes = sum(len(mesh.cells[i].data) for i in _volumes(solution))
+    for name, values in cell_data.items():
+        nothing = np.nan if values.dtype.kind == "f" else -1
+        none_there = np.full((n_volumes, *values.shape[1:]), nothing)
+        cell_data[name] = np.concatenate([none_there, values])
+    point_data = {
+        "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
+        "stress": solution.stress,
+        "normal_stress": solution.nodal_normal_stress,
+        "body": solution.body,
+    }
+    for name in ("reaction", "motion"):
+        if (vectors := getattr(solution, name)) is not None:
+            point_data[name] = np.pad(vectors, ((0, 0), (0, 3 - dim)))
+    if any(zone.recovered for zone in solution.zones):
+        point_data["recovered_pressure"] = _recovered_at_nodes(solution)
+    return point_data, cell_data
+
+
+def _volumes(solution: Solution) -> list[int]:
+    dim = solution.mesh.points.shape[1]
+    return [i for i, block in enumerate(solution.mesh.cells) if block.dim == dim]
+
+
+def _recovered_at_nodes(solution: Solution) -> np.ndarray:
+    """The recovered pressure (n,) at slave nodes, NaN at all others."""
+    values = np.full(len(solution.mesh.points), np.nan)
+    for zone in solution.zones:
+        if zone.recovered:
+            values[zone.recovered.nodes] = zone.recovered.at_nodes
+    return values
+
+
+def _face_blocks(
+    solution: Solution,
+) -> tuple[list[tuple[str, np.ndarray]], dict[str, np.ndarray]]:
+    """The sub-faces of all zones, a block for each cell type, and the data of these cells."""
+    parts = [
+        (kind, connectivity, owner, number)
+        for number, zone in enumerate(solution.zones)
+        for kind, connectivity, owner in zone.faces
+    ]
+    parts.sort(key=itemgetter(0))  # stable: the zones of a block stay in their order
+    blocks = [
+        (cell_type(kind).meshio, np.concatenate([part[1] for part in same]))
+        for kind, same in groupby(parts, key=itemgetter(0))
+    ]
+    none = np.empty(0, dtype=int)
+    data = {
+        "macro_element": np.concatenate([none, *(owner for _, _, owner, _ in parts)]),
+        "zone": np.concatenate([none, *(np.full(len(o), number) for _, _, o, number in parts)]),
+    }
+    for name, attribute in _ON_FACES.items():
+        values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
+        data[name] = np.concatenate([np.empty(0), *values]).astype(float)
+    if solution.case.frictional:
+        for name in ("friction_traction", "slip", "slip_total"):
+            values = [_of_friction(solution.zones[n], name)[owner] for _, _, owner, n in parts]
+            data[name] = np.concatenate(values)
+    return blocks, data
+
+
+def _of_friction(zone: ZoneResult, name: str) -> np.ndarray:
+    """A vector (m, 3) of friction; zero in a zone without."""
+    m, dim = zone.centre.shape
+    values = np.zeros((m, dim)) if zone.friction is None else getattr(zone.friction, name)
+    return np.pad(values, ((0, 0), (0, 3 - dim)))
