@@ -217,27 +217,33 @@ def _in_rigid(case: Case) -> Iterator[Fault]:
 
 def _of_moving(case: Case) -> Iterator[Fault]:
     """What does not go with bodies that move far."""
-    motion = "does not go with `motion: large`"
-    for i, support in enumerate(case.supports):
-        for key in ("together", "cyclic"):
-            if getattr(support, key):
-                yield f"supports[{i}].{key}", None, f"{motion}; allowed: fix, spring"
-    for i, load in enumerate(case.loads):
-        if load.strains:
-            yield f"loads[{i}].{load.kind}", None, f"{motion}; allowed: loads of other kinds"
+    for key, value, instead in _not_moving(case):
+        yield key, value, f"does not go with `motion: large`; allowed: {instead}"
+
+
+def _not_moving(case: Case) -> Iterator[Fault]:
+    """The same with what is allowed in its place."""
+    joins = ("together", "cyclic")
+    for i, key in (
+        (i, key) for i, s in enumerate(case.supports) for key in joins if getattr(s, key)
+    ):
+        yield f"supports[{i}].{key}", None, "fix, spring"
+    for i, load in ((i, load) for i, load in enumerate(case.loads) if load.strains):
+        yield f"loads[{i}].{load.kind}", None, "loads of other kinds"
     for i, zone in enumerate(case.zones):
         if zone.clearance is not None:
-            allowed = f"{motion}, which finds the gap itself; allowed: interference"
-            yield f"contact[{i}].clearance", zone.clearance, allowed
+            yield (
+                f"contact[{i}].clearance",
+                zone.clearance,
+                "interference, beside the gap as meshed",
+            )
     for name, probe in case.probes.items():
         if probe.at:
-            yield f"probes.{name}.at", list(probe.at), f"{motion}; allowed: group"
+            yield f"probes.{name}.at", list(probe.at), "group"
     if case.solution:
-        allowed = f"{motion}; allowed: a reference of values"
-        yield "reference.solution", case.solution.name, allowed
+        yield "reference.solution", case.solution.name, "a reference of values"
     if "displacement" in case.reference:
-        allowed = f"{motion}; allowed: displacement_at, the whole displacement at a group"
-        yield "reference.displacement", None, allowed
+        yield "reference.displacement", None, "displacement_at, the whole one of a group"
 
 
 def _of_dimension(case: Case, dim: int) -> Iterator[Fault]:

@@ -32,7 +32,7 @@ from .results.results import solution_of
 from .results.solution import Line, Position, Solution, Validity
 from .scene.bodies import body_names, check_geometry
 from .scene.moved import Frames, Moved, predicted, rotation_vector, settled
-from .scene.scene import Model, Scene, build_model, scene_of
+from .scene.scene import CutModel, Scene, build_model, scene_of
 
 _LOG = logging.getLogger(__name__)
 # Frames stay where contact surfaces move by less than this share of a macro-element.
@@ -88,7 +88,9 @@ def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) 
     return finished(whole, clock, ended)
 
 
-def _placed(model: Model, step: Step, frames: Frames, last: _Place | None, clock: Clock) -> _Place:
+def _placed(
+    model: CutModel, step: Step, frames: Frames, last: _Place | None, clock: Clock
+) -> _Place:
     """A step solved where its bodies are; SolveError where it has no solution or no place."""
     rest, names = model.groups, None
     frames, held = predicted(rest, step, frames)

@@ -8,9 +8,11 @@ import numpy as np
 
 from ..case.expressions import evaluate
 from ..mechanics.fem.stress import COMPONENTS
+from ..simulation.equilibrium.constraints import MIN_COVERAGE
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
+from .coverage import expected_coverage
 from .samples import Reference, Sample, Sampler, by_component
 
 
@@ -123,6 +125,44 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     return Sample(values, np.zeros(len(values)), lambda i: places[i])
 
 
+def at_positions(quantity: str) -> Sampler:
+    """Sample a field of contact at all positions before the last one, where it is covered."""
+
+    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+        numbers = [one.name for one in solution.zones]
+        # Vectors are given on the surface that the case lists as slave.
+        sign = -1.0 if solution.swapped and quantity == "friction_traction" else 1.0
+        values, places, where = [], [], []
+        for step, position in enumerate(solution.earlier, start=1):
+            fields = position.of_cells
+            mine = (fields["zone"] == numbers.index(zone.name)) & (
+                fields["coverage"] > MIN_COVERAGE
+            )
+            elements, first = np.unique(fields["macro_element"][mine], return_index=True)
+            dim = solution.mesh.points.shape[1]
+            values.append(sign * fields[quantity][mine][first].reshape(len(first), -1)[:, :dim])
+            places.append(_at_macro(zone, position.points)[elements])
+            where += [f"macro-element {element} in step {step}" for element in elements]
+        if not where:
+            return None
+        found, centres = np.concatenate(values), np.concatenate(places)
+        given = reference if isinstance(reference, tuple) else (reference,)
+        expected = np.stack([evaluate(one, centres) for one in given], axis=1)
+        count = len(where)
+        return Sample(found.T.ravel(), expected.T.ravel(), lambda i: where[i % count])
+
+    return sample
+
+
+def _at_macro(zone: ZoneResult, points: np.ndarray) -> np.ndarray:
+    """The middle (m, dim) of the nodes of each macro-element, with the nodes at points (n, dim)."""
+    total, count = np.zeros((len(zone.area), points.shape[1])), np.zeros(len(zone.area))
+    for _, nodes, macro in zone.faces:
+        np.add.at(total, macro, points[nodes].mean(axis=1))
+        np.add.at(count, macro, 1.0)
+    return total / count[:, None]
+
+
 def friction(quantity: str) -> Sampler:
     """Sample the traction on the slave, or the slip of the master relative to it."""
 
@@ -141,9 +181,12 @@ def friction(quantity: str) -> Sampler:
             lambda: reference.of_friction(zone, quantity),
             "macro-element {}".format,
         )
-        # Nothing slips where the surfaces are apart, however far they move along each other.
-        open_there = np.tile(zone.friction.status == 0, len(sample.values) // len(values))
-        sample.reference[open_there & (quantity == "slip")] = 0.0
+        # Nothing slips where the surfaces are apart, however far they move along each other, and
+        # nothing rubs where there is no other surface.
+        nowhere = zone.friction.status == 0
+        if quantity == "friction_traction":
+            nowhere = expected_coverage(solution, zone, reference) <= 0
+        sample.reference[np.tile(nowhere, len(sample.values) // len(values))] = 0.0
         return sample
 
     return of_quantity

@@ -76,42 +76,6 @@ def pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Samp
     return _at_macro_elements(zone.multiplier, reference_where_covered(solution, zone, reference))
 
 
-def at_positions(quantity: str) -> Sampler:
-    """Sample a field of contact at all positions before the last one, where it is covered."""
-
-    def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
-        numbers = [one.name for one in solution.zones]
-        # Vectors are given on the surface that the case lists as slave.
-        sign = -1.0 if solution.swapped and quantity == "friction_traction" else 1.0
-        values, places, where = [], [], []
-        for step, position in enumerate(solution.earlier, start=1):
-            fields = position.of_cells
-            mine = (fields["zone"] == numbers.index(zone.name)) & (fields["coverage"] > 0)
-            elements, first = np.unique(fields["macro_element"][mine], return_index=True)
-            dim = solution.mesh.points.shape[1]
-            values.append(sign * fields[quantity][mine][first].reshape(len(first), -1)[:, :dim])
-            places.append(_at_macro(zone, position.points)[elements])
-            where += [f"macro-element {element} in step {step}" for element in elements]
-        if not where:
-            return None
-        found, centres = np.concatenate(values), np.concatenate(places)
-        given = reference if isinstance(reference, tuple) else (reference,)
-        expected = np.stack([evaluate(one, centres) for one in given], axis=1)
-        count = len(where)
-        return Sample(found.T.ravel(), expected.T.ravel(), lambda i: where[i % count])
-
-    return sample
-
-
-def _at_macro(zone: ZoneResult, points: np.ndarray) -> np.ndarray:
-    """The middle (m, dim) of the nodes of each macro-element, with the nodes at points (n, dim)."""
-    total, count = np.zeros((len(zone.area), points.shape[1])), np.zeros(len(zone.area))
-    for _, nodes, macro in zone.faces:
-        np.add.at(total, macro, points[nodes].mean(axis=1))
-        np.add.at(count, macro, 1.0)
-    return total / count[:, None]
-
-
 def pressure_of_forces(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The pressure by forces at slave nodes; the multiplier where they do not determine it."""
     found = zone.multiplier if zone.pressure_of_forces is None else zone.pressure_of_forces

@@ -36,6 +36,10 @@ def label_fields(grid: h5py.Group, contact: h5py.Group, units: Mapping[str, str]
         # VTK crashes on texts that are not declared as ASCII; their bytes may be UTF-8.
         texts = np.array([text.encode() for text in sorted(listed)], dtype=object)
         grid.create_dataset("FieldData/units", data=texts, dtype=h5py.string_dtype("ascii"))
+        if "Steps" in grid:  # the same at all positions
+            count = int(grid["Steps"].attrs["NSteps"])
+            grid["Steps/FieldDataOffsets/units"] = np.zeros(count, dtype=np.int64)
+            grid["Steps/FieldDataSizes/units"] = np.tile([1, len(texts)], (count, 1))
 
 
 def _label(group: h5py.Group, units: Mapping[str, str]) -> set[str]:
@@ -46,6 +50,8 @@ def _label(group: h5py.Group, units: Mapping[str, str]) -> set[str]:
     for name in names:
         field = name.rpartition("/")[2]
         unit = units.get(_KINDS.get(field, ""))
+        if name.startswith("Steps/"):
+            continue
         if unit is not None and isinstance(group[name], h5py.Dataset):
             group[name].attrs["unit"] = unit
             labelled.add(f"{field}: {unit}")

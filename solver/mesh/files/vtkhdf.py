@@ -102,11 +102,10 @@ def write_grid(
     flat = [nodes.ravel() for _, nodes in cells]
     all_points = [*(one[0] for one in earlier.positions), mesh.points]
     points = np.pad(np.concatenate(all_points), ((0, 0), (0, 3 - dim)))
-    steps = len(all_points)
     arrays = {
-        "NumberOfPoints": np.array([len(mesh.points)] * steps),
-        "NumberOfCells": np.array([len(sizes)] * steps),
-        "NumberOfConnectivityIds": np.array([sizes.sum()] * steps),
+        "NumberOfPoints": np.array([len(mesh.points)]),
+        "NumberOfCells": np.array([len(sizes)]),
+        "NumberOfConnectivityIds": np.array([sizes.sum()]),
         "Points": points,
         "Connectivity": np.concatenate(flat).astype(np.int64),
         "Offsets": np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
@@ -129,7 +128,7 @@ def _write_times(folder: h5py.Group, times: Sequence[float], points: int, cells:
     count = np.arange(len(times))
     folder.attrs["NSteps"] = len(times)
     folder["Values"] = np.array(times, dtype=float)
-    folder["PartOffsets"], folder["NumberOfParts"] = count, np.ones_like(count)
+    folder["PartOffsets"], folder["NumberOfParts"] = 0 * count, np.ones_like(count)
     folder["PointOffsets"] = count * points
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         folder[name] = np.zeros((len(times), 1), dtype=np.int64)
@@ -145,7 +144,8 @@ def read_earlier(
     """Points and fields of the positions before that of a grid."""
     dim, found = int(group.attrs["Dimension"]), []
     points, cells = (int(group[f"NumberOf{name}"][0]) for name in ("Points", "Cells"))
-    for step in range(len(group["NumberOfPoints"]) - 1):
+    steps = int(group["Steps"].attrs["NSteps"]) if "Steps" in group else 1
+    for step in range(steps - 1):
         rows = {
             "PointData": slice(step * points, (step + 1) * points),
             "CellData": slice(step * cells, (step + 1) * cells),
@@ -188,7 +188,7 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
         ]
     for name, ids in groups["nodes"].items():
         point_sets[_plain(name)] = ids[()]
-    count = {"PointData": -int(group["NumberOfPoints"][-1]), "CellData": -bounds[-1][1]}
+    count = {"PointData": -int(group["NumberOfPoints"][0]), "CellData": -bounds[-1][1]}
     points = group["Points"][count["PointData"] :, :dim]
     mesh = meshio.Mesh(points, cells, cell_sets=cell_sets, point_sets=point_sets)
     # Fields of earlier positions stand first.

@@ -24,8 +24,8 @@ from .parts.springs import Springs
 
 # Imposed displacements are followed until a frame moves by less than this share of its body.
 _FOLLOWED, _ITERATIONS = 1e-13, 50
-# Motions that imposed displacements see by less than this share are not imposed.
-_SEEN = 1e-8
+# Motions that imposed displacements see by less than this share of a body are not imposed.
+_SEEN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,9 @@ def predicted(rest: Attributes, step: Step, last: Frames) -> tuple[Frames, np.nd
             if not holding.frames and (there := body[fixed.nodes] == number).any()
         ]
         if mine and number not in rigid:
-            frames, held[number] = _following(points, frames, number, mine, rest.axisymmetric)
+            frames, held[number] = _following(
+                points, points[body == number], frames, number, mine, rest.axisymmetric
+            )
     for name, frame in rest.frames().items():
         turn, shift = _imposed_frame(rest, name, frame.point, step, frames)
         for number in np.unique(body[frame.nodes]):
@@ -187,19 +189,22 @@ def predicted(rest: Attributes, step: Step, last: Frames) -> tuple[Frames, np.nd
 
 def _following(
     points: np.ndarray,
+    mine: np.ndarray,
     frames: Frames,
     number: int,
     imposed: list[Fixed],
     axisymmetric: bool,
 ) -> tuple[Frames, bool]:
-    """The frame of a body that has displacements imposed, and whether they hold all of it."""
+    """The frame of a body that has displacements imposed, and whether they hold all of it.
+
+    `points` (n, dim) of all bodies, `mine` (m, dim) of this one.
+    """
     nodes, directions, values = (
         np.concatenate([getattr(one, key) for one in imposed])
         for key in ("nodes", "directions", "values")
     )
-    dim, given = points.shape[1], points[nodes]
-    size = float(np.ptp(points, axis=0).max())
-    held = False
+    dim, given, held = points.shape[1], points[nodes], False
+    size = float(np.ptp(mine, axis=0).max())
     for _ in range(_ITERATIONS):
         turn, shift = frames.turn[number], frames.shift[number]
         now = given @ turn.T + shift

@@ -199,7 +199,7 @@ class Scene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Model:
+class CutModel:
     """A case on its mesh, cut but not paired: what is the same wherever its bodies are.
 
     `surfaces`: slave faces as meshed and master faces of each zone; for the rest see `Scene`.
@@ -227,7 +227,7 @@ def build_scene(
     return scene_of(model, model.groups, clock)
 
 
-def build_model(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> Model:
+def build_model(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> CutModel:
     """The cut mesh of a case and its groups; raises InputError where case and mesh do not fit."""
     mesh = with_groups(case, mesh)
     check_groups(case, mesh)
@@ -245,7 +245,7 @@ def build_model(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -
         CutZone(slave, faces) for (slave, _), faces in zip(surfaces, sub_faces, strict=True)
     ]
     groups = Attributes(case, local, cut_mesh, cut_zones, origin)
-    return Model(
+    return CutModel(
         groups=groups,
         options=options,
         given=GivenMesh(
@@ -260,7 +260,7 @@ def build_model(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -
     )
 
 
-def scene_of(model: Model, groups: Attributes, clock: Clock) -> Scene:
+def scene_of(model: CutModel, groups: Attributes, clock: Clock) -> Scene:
     """The discrete problem of a model with its `groups` where they are."""
     case, options, surfaces = groups.case, model.options, model.surfaces
     safeguards = options.safeguards
