@@ -28,6 +28,7 @@ from .charts import (
 from .errors import address, against_time, drawn, mark, unknowns
 from .formats import TEMPLATES, render
 from .pictures import VIEWER, picture, profile
+from .positions import positions
 from .rows import Row, causes, choices, ours
 from .sections import FamilySection, grouped
 from .tables import outcome
@@ -215,6 +216,7 @@ def family_page(
         norms=ERRORS,
         picture=lambda row: picture(row, section.pictures),
         pressure=lambda row: _pressure(row, section.pictures),
+        positions=positions,
         left_out=left_out(section.rows),
         folder=folder,
     )

@@ -38,7 +38,8 @@ def test_the_exact_state_passes_every_check_of_the_table(solution):
     checks = run_checks(solution)
     given = {None, *solution.case.reference}
     named = [c.name for c in CHECKS if c.name not in ERRORS and c.key in given]
-    named.remove("friction_law")  # of zones with friction
+    # Of zones with friction, and of bodies that move far.
+    named = [name for name in named if name not in ("friction_law", "position_pressure")]
     assert [check.name for check in checks] == named
     assert len(named) > 15
     assert all(check.passed for check in checks)

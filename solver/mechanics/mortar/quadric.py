@@ -32,6 +32,22 @@ class Quadric:
         """
         return self.slope + (places - self.point) @ self.curvature
 
+    def moved(self, turn: np.ndarray, shift: np.ndarray) -> "Quadric":
+        """The surface after a rotation `turn` (dim, dim) about the origin, then a `shift` (dim,).
+
+        A plane with the normal x, turned by a quarter:
+
+        >>> quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+        >>> plane(np.zeros(2), np.array([1.0, 0.0])).moved(quarter, np.ones(2)).slope.tolist()
+        [0.0, 1.0]
+        """
+        return Quadric(
+            point=turn @ self.point + shift,
+            level=self.level,
+            slope=turn @ self.slope,
+            curvature=turn @ self.curvature @ turn.T,
+        )
+
     def distance(self, places: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance (…,) from places (…, dim) along unit normals to the surface, and where it is.
 

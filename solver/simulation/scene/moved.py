@@ -107,13 +107,8 @@ class Moved(Attributes):
         given = self.rest.surface(name)
         if given is None:
             return None
-        turn = self.frames_of_bodies.turn[self.number(name)]
-        return replace(
-            given,
-            point=self.carried(name, given.point),
-            slope=turn @ given.slope,
-            curvature=turn @ given.curvature @ turn.T,
-        )
+        frames, number = self.frames_of_bodies, self.number(name)
+        return given.moved(frames.turn[number], frames.shift[number])
 
     def carried(self, name: str, point: np.ndarray) -> np.ndarray:
         """Where a point (dim,) of the mesh as given, which moves with a rigid body, is now."""

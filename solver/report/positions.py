@@ -1,0 +1,38 @@
+"""Contact over the steps of a path: its largest pressure, and its mean, the force over the area."""
+
+import numpy as np
+
+from ..verification.units import with_unit
+from .charts import BLUE, ORANGE, Axis, Chart, Look, series_chart
+from .rows import Row
+
+# Fewer steps are no path.
+_FEWEST = 3
+_ZONE = "zone "
+_LOOKS = {"largest pressure": Look(BLUE), "normal force / area": Look(ORANGE, "square")}
+
+
+def positions(row: Row) -> Chart | str:
+    """The chart of one solve's zones over its steps; empty where there are few."""
+    records = []
+    for one in row.verdict.forces:
+        if not one.name.startswith(_ZONE) or not one.area or not one.pressure:
+            continue
+        normal = np.array(one.force) - np.array(one.friction or 0.0)
+        zone, area = one.name.removeprefix(_ZONE), one.area[0]
+        values = max(one.pressure), float(np.linalg.norm(normal)) / area if area else 0.0
+        for series, value in zip(_LOOKS, values, strict=True):
+            records.append({"series": series, "step": one.step, "value": value, "zone": zone})
+    if len({record["step"] for record in records}) < _FEWEST:
+        return ""
+    unit = row.verdict.units.get("stress")
+    return series_chart(
+        f"positions-{row.name}",
+        f"{row.name}: contact over the steps",
+        records,
+        Axis("step", "step"),
+        Axis("value", with_unit("pressure", unit)),
+        _LOOKS,
+        tips={"zone": "zone"},
+        height=200,
+    )
