@@ -15,7 +15,7 @@ import numpy as np
 
 from ..case.acting import Step
 from ..case.model import Case
-from ..lac.cells.faces import FaceBlock, circumference
+from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
 from ..system.errors import InputError
 from ..system.progress import Clock, stage
@@ -24,19 +24,18 @@ from .equilibrium.recovery import Recovered, recovered
 from .equilibrium.state import Equilibrium
 from .finished import called, finished, tell
 from .judgement.plan import decided, plan_notes
-from .judgement.validity import validity
+from .judgement.validity import NOTED_SLIP, validity
 from .options import Options
 from .results.fields import grid_fields
 from .results.forces import RigidMotion
 from .results.results import solution_of
 from .results.solution import Line, Position, Solution, Validity
+from .scene.attributes import Attributes
 from .scene.bodies import body_names, check_geometry
 from .scene.moved import Frames, Moved, predicted, rotation_vector, settled
 from .scene.scene import CutModel, Scene, build_model, scene_of
 
 _LOG = logging.getLogger(__name__)
-# Frames stay where contact surfaces move by less than this share of a macro-element.
-_STAY = 1e-3
 # So often a step is solved at most.
 _ROUNDS = 10
 # What a moved scene knows its step as: its loads are those of one step.
@@ -92,10 +91,11 @@ def _placed(
     model: CutModel, step: Step, frames: Frames, last: _Place | None, clock: Clock
 ) -> _Place:
     """A step solved where its bodies are; SolveError where it has no solution or no place."""
-    rest, names = model.groups, None
-    frames, held = predicted(rest, step, frames)
+    rest, faces = model.groups, model.contact_faces
+    wanted, held = predicted(rest, step, frames)
+    frames = _followed(rest, faces, frames, wanted)
     for count in range(1, _ROUNDS + 1):
-        groups = Moved(rest, model.contact_faces, step, frames)
+        groups = Moved(rest, faces, step, frames, wanted)
         try:
             scene = scene_of(model, groups, clock)
             if last is None:
@@ -109,16 +109,15 @@ def _placed(
             raise SolveError(f"{error.key}: {error.problem}") from None
         with stage(clock, "solve"):
             state, field = _solved(problem)
-        if held.all():
+        wanted, _ = predicted(rest, step, settled(groups, state.displacement, held))
+        following = _followed(rest, faces, frames, wanted)
+        moves = (following.turn != frames.turn).any(axis=(1, 2))
+        moves |= (following.shift != frames.shift).any(axis=1)
+        _LOG.info("round %d: %d bodies went on", count, moves.sum())
+        if not moves.any():
             return _Place(groups, problem, state, field, count)
-        following, _ = predicted(rest, step, settled(groups, state.displacement, held))
-        moves = _moves(scene, groups.contact_faces, rest.points, frames, following)
-        _LOG.info("round %d: frames move contact by %.1e of a face", count, moves.max())
-        if moves.max() < _STAY:
-            return _Place(groups, problem, state, field, count)
-        frames, names = following, body_names(scene)
-    name = (names or [""])[int(moves.argmax())]
-    raise SolveError(f"{name} finds no place: contact still moves by {moves.max():.1e} of a face")
+        frames = following
+    raise SolveError(f"{body_names(scene)[int(moves.argmax())]} finds no place: it still moves")
 
 
 def _solved(problem: ContactProblem) -> tuple[Equilibrium, Recovered]:
@@ -133,22 +132,24 @@ def _solved(problem: ContactProblem) -> tuple[Equilibrium, Recovered]:
     return recovered(problem, state, _STEP)
 
 
-def _moves(
-    scene: Scene, faces: list[FaceBlock], points: np.ndarray, old: Frames, new: Frames
-) -> np.ndarray:
-    """How far other frames move the contact surfaces of each body (b,), by the smallest face."""
-    moved = np.linalg.norm(new.placed(points, scene.body) - old.placed(points, scene.body), axis=1)
-    found, dim, sizes = np.zeros(scene.n_bodies), points.shape[1], [np.inf]
-    for zone in scene.zones:
-        surface = zone.operator.surface
-        area = surface.area
-        if scene.case.axisymmetric:
-            area = area / circumference(surface.centre)
-        sizes.append(float(area.min()) ** (1 / (dim - 1)))
+def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames) -> Frames:
+    """The new frames of bodies whose contact they move by more than linear theory passes over.
+
+    A body without contact is measured all over, by the smallest face of all.
+    """
+    points, body = rest.points, rest.body
+    moved = np.linalg.norm(new.beyond(old, points, body), axis=1)
+    edges = [points[block.nodes[:, 1]] - points[block.nodes[:, 0]] for block in faces]
+    size = min((float(np.linalg.norm(e, axis=1).min()) for e in edges), default=np.inf)
+    counted = np.zeros(len(moved), dtype=bool)
     for block in faces:
-        nodes = block.nodes.ravel()
-        np.maximum.at(found, scene.body[nodes], moved[nodes])
-    return found / min(sizes)
+        counted[block.nodes] = True
+    alone = ~np.isin(body, body[counted])
+    far = (moved > NOTED_SLIP * size) & (counted | alone)
+    frames = old
+    for number in np.unique(body[far]).tolist():
+        frames = frames.with_body(number, new.turn[number], new.shift[number])
+    return frames
 
 
 def _solution(

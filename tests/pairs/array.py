@@ -44,7 +44,10 @@ def _rows(domain: dict[str, tuple[str, ...]], strength: int) -> list[Row]:
 
 def stored() -> list[Row]:
     """The rows for pairs that are kept, half a minute to make; none where options have changed."""
-    rows = [dict(zip(OPTIONS, row, strict=True)) for row in json.loads(_STORED.read_text())]
+    given = json.loads(_STORED.read_text())
+    if any(len(row) != len(OPTIONS) for row in given):
+        return []
+    rows = [dict(zip(OPTIONS, row, strict=True)) for row in given]
     whole = all(map(possible, rows)) and not any(missing(rows))
     return rows if whole else []
 

@@ -8,7 +8,7 @@ import numpy as np
 from solver.lac.errors import SolveError
 from solver.simulation.options import LEAN, Options
 from solver.simulation.results.solution import Solution
-from solver.simulation.simulate import assembled, solve_problem
+from solver.simulation.simulate import solved
 from solver.system.errors import InputError
 from solver.system.progress import Clock
 
@@ -38,13 +38,9 @@ def tried(row: Row) -> Outcome:
     try:
         problem = problem_of(row)
         options = Options.everything() if row["work"] == "everything" else LEAN
-        made = assembled(problem.case, problem.mesh, options, clock)
+        solution = solved(problem.case, problem.mesh, options, clock)
     except InputError as error:
         return Outcome("refused", np.inf, str(error))
-    except Exception as error:  # noqa: BLE001
-        return Outcome("wrong", np.inf, f"before the solve: {type(error).__name__}: {error}")
-    try:
-        solution = solve_problem(made, clock)
     except SolveError as error:
         return Outcome("wrong", np.inf, f"not solved: {error}")
     except Exception as error:  # noqa: BLE001
@@ -65,12 +61,15 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
     exact_of = {body.name: body for body in problem.bodies}
     found: dict[str, float] = {}
     moved, wanted = solution.displacement, np.zeros_like(solution.displacement)
+    given = solution.mesh.points
+    if solution.motion is not None:
+        moved, given = moved + solution.motion, given - solution.motion
     seen = np.zeros(len(moved), dtype=bool)
     for number, info in enumerate(solution.bodies):
         if (body := exact_of.get(info.name)) is None:
             continue
         mine = solution.body == number
-        places = (solution.mesh.points[mine, :dim] - placed.origin) @ placed.turn / placed.scale
+        places = (given[mine, :dim] - placed.origin) @ placed.turn / placed.scale
         local = places @ body.gradient.T + body.shift
         wanted[mine] = placed.scale * local @ placed.turn.T
         seen |= mine

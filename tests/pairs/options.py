@@ -36,6 +36,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "load": ("pressure", "traction", "force"),
     "also": ("nothing", "body force", "strain", "temperature"),
     "steps": ("one", "factors", "path"),
+    "motion": ("small", "large"),
     "materials": ("equal", "stiff master", "nearly incompressible"),
     "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
     "form": ("as it is", "exchanged", "renumbered", "rotated", "far", "other units"),
@@ -108,6 +109,16 @@ REFUSED = (
         "more multipliers than nodes that move",
         ("treatment", "cyclic"),
     ),
+    *(
+        Rule({"motion": ("large",), name: values}, why, ("motion", *values[:1]))
+        for name, values, why in (
+            ("supports", ("together",), "one displacement of nodes that turn"),
+            ("supports", ("cyclic",), "a side that moves as another does"),
+            ("also", ("strain",), "its components would have to turn"),
+            ("also", ("temperature",), "its components would have to turn"),
+            ("gap", ("clearance", "clearance 0"), "motion finds the gap itself"),
+        )
+    ),
     *_of_slave(
         QUADRATIC,
         {"treatment": ("nodal_dual",)},
@@ -142,6 +153,22 @@ REFUSED = (
     ),
 )
 EXCLUDED = (
+    Rule(
+        {
+            "also": ("strain", "temperature"),
+            "supports": ("springs",),
+            "materials": ("stiff master",),
+        },
+        "a stiff body on soft springs: exact pressure, displacement rounded to 2e-8",
+    ),
+    Rule(
+        {"motion": ("large",), "interface": SHAPED, "materials": ("stiff master",)},
+        "fits by a strain",
+    ),
+    Rule(
+        {"motion": ("large",), "friction": ("slip back",), "second zone": ("friction",)},
+        "moves by more than a tenth of a face, which is followed",
+    ),
     Rule({"space": _not("space", "solid"), "slave cells": SOLID}, "cells of another dimension"),
     Rule({"space": _not("space", "solid"), "master cells": SOLID}, "cells of another dimension"),
     Rule({"space": ("solid",), "slave cells": PLANE}, "cells of another dimension"),

@@ -131,6 +131,8 @@ class _Builder(Places):
             text["plane"] = row["space"]
         if row["master"] in RIGID:
             text["bodies"] = self._rigid()
+        if row["motion"] == "large":
+            text["motion"] = "large"
         text |= _FORMS.get(row["form"], {})
         if row["steps"] != "one":
             _multiply(text, 1 / _LAST)

@@ -127,8 +127,10 @@ def _contained(
 
 # A strain or rotation above the first is noted, one above the second is unreliable.
 _NOTED_STRAIN, _SMALL_STRAIN = 1e-2, 1e-1
-# The same for a slip, a share of the size of the macro-element.
-_NOTED_SLIP, _SMALL_SLIP = 0.1, 1.0
+NOTED_SLIP = 0.1
+"""A larger slip than this share of a macro-element is noted: linear theory has small ones."""
+# One above this is unreliable.
+_SMALL_SLIP = 1.0
 # The same for a share of a macro-element that should have a partner.
 _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
@@ -257,7 +259,7 @@ def remarks(found: Validity) -> Iterator[Line]:
     if max(found.strain, found.rotation) > _NOTED_STRAIN:
         what = f"largest strain {found.strain:.1e}, rotation {found.rotation:.1e}"
         yield Line(what, "linear theory leaves out terms of this size, relative to what it keeps")
-    if found.slip > _NOTED_SLIP:
+    if found.slip > NOTED_SLIP:
         what = f"contact slides by up to {found.slip:.2g} of a face"
         yield Line(what, "pairs of faces belong to the undeformed bodies")
     if found.partly_covered:

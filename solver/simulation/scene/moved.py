@@ -44,6 +44,11 @@ class Frames:
         """Where points (n, dim) of bodies (n,) are now."""
         return self.turned(points, body) + self.shift[body]
 
+    def beyond(self, other: "Frames", points: np.ndarray, body: np.ndarray) -> np.ndarray:
+        """How much further (n, dim) than other frames they move points; exact for translations."""
+        further = Frames(self.turn - other.turn, self.shift - other.shift)
+        return further.placed(points, body)
+
     def turned(self, vectors: np.ndarray, body: np.ndarray) -> np.ndarray:
         """Vectors (n, dim) of bodies (n,) as these turned."""
         return np.einsum("nij,nj->ni", self.turn[body], vectors)
@@ -59,20 +64,29 @@ class Frames:
 class Moved(Attributes):
     """The groups of a case on its mesh as the bodies moved, and what acts there in a step.
 
-    `rest`: those of the mesh as given; `contact_faces` of all surfaces.
+    `rest`: those of the mesh as given; `faces` of all contact surfaces; `wanted`: the frames that
+    follow all that is imposed, of which rigid bodies get what `frames` have not.
     """
 
-    def __init__(self, rest: Attributes, faces: list[FaceBlock], step: Step, frames: Frames):
+    def __init__(
+        self, rest: Attributes, faces: list[FaceBlock], step: Step, frames: Frames, wanted: Frames
+    ):
         cut = replace(rest.cut, points=frames.placed(rest.points, rest.body))
         case = replace(rest.case, steps=(step,))
         super().__init__(case, rest.mesh, cut, rest.zones, rest.origin)
         self.rest, self.step, self.frames_of_bodies = rest, step, frames
-        self.contact_faces = faces
+        self.contact_faces, self._wanted = faces, wanted
 
     @cached_property
     def motion(self) -> np.ndarray:
         """The displacement (n, dim) of the frames."""
-        return self.points - self.rest.points
+        still = Frames.still(len(self.frames_of_bodies.turn), self.points.shape[1])
+        return self.frames_of_bodies.beyond(still, self.rest.points, self.body)
+
+    @cached_property
+    def _left(self) -> np.ndarray:
+        """What is left (n, dim) to where rigid bodies are wanted."""
+        return self._wanted.beyond(self.frames_of_bodies, self.rest.points, self.body)
 
     def forces(self, name: str | None = None) -> np.ndarray:  # noqa: ARG002
         """Nodal forces (n, dim) of the step."""
@@ -84,11 +98,13 @@ class Moved(Attributes):
         return total + self._in_step(lambda name: sum(h.force(name) for h in self.holdings))
 
     def fixed(self, name: str | None = None) -> dict[str, Fixed]:  # noqa: ARG002
-        """What supports leave of the step's displacements beside the frames; of rigid bodies 0."""
+        """What is imposed in the step beside the frames."""
         found = {}
         for holding, key, fixed in _imposed(self.rest, self.step):
             carried = np.einsum("nd,nd->n", fixed.directions, self.motion[fixed.nodes])
-            left = 0 * fixed.values if holding.frames else fixed.values - carried
+            left = fixed.values - carried
+            if holding.frames:
+                left = np.einsum("nd,nd->n", fixed.directions, self._left[fixed.nodes])
             found[key] = replace(fixed, values=left)
         return found
 
