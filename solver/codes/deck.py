@@ -293,6 +293,8 @@ def _is_constant(load: Load) -> bool:
 
 
 def _refuse(case: Case) -> None:
+    if case.moving:
+        raise UnsupportedError("bodies that move far (motion: large): not written for codes")
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
     if len(case.steps) > 1 and case.frictional:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from msgspec import structs
 
+from solver.simulation.scene.moved import Frames
 from tests.faults.patches import (
     changed,
     every_third_off,
@@ -67,6 +68,7 @@ STUCK, SLIDING, STEPWISE = (f"friction-patch/{n}" for n in ("n-stick", "e-slip",
 UNLOADED, PULLED = "friction/unloaded-quad8", "friction/pulled-quad8"
 RIGHT, RECOVERED = "friction-patch/t-slip", "friction/sliding-recovered"
 SPATIAL = "friction-patch/v-slip"
+SLID, RUBBING, TURNED = "motion/slide-c", "motion/slide-c-friction", "motion/rings"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 
@@ -305,6 +307,16 @@ MUTANTS = (
     Mutant("traction-unrecovered", "the recovered traction is that on the master", RECOVERED,
            "simulation.results.results:zone_friction",
            changed(lambda f: f and replace(f, recovered=-f.recovered))),
+    Mutant("frames-kept", "bodies that slide far are not followed", SLID,
+           "simulation.motion:_followed",
+           given(lambda rest, faces, old, _: (rest, faces, old, old))),
+    Mutant("slip-of-the-path", "slip leaves out how far the bodies went", RUBBING,
+           "simulation.equilibrium.problem:ContactProblem.__init__",
+           given(lambda problem, scene, carried=None: (problem, scene, 0 * carried))),
+    Mutant("pressure-kept", "pressure does not turn with its face", TURNED,
+           "simulation.scene.moved:Frames.turned",
+           given(lambda frames, vectors, body: (Frames.still(len(frames.turn), len(vectors[0])),
+                                                vectors, body))),
     Mutant("work-halved", "friction does half the work, as if it grew with the slip", STEPWISE,
            "simulation.equilibrium.friction:_work", changed(lambda work: work / 2)),
 )  # fmt: skip

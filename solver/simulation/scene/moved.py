@@ -42,7 +42,7 @@ class Frames:
 
     def placed(self, points: np.ndarray, body: np.ndarray) -> np.ndarray:
         """Where points (n, dim) of bodies (n,) are now."""
-        return self.turned(points, body) + self.shift[body]
+        return np.einsum("nij,nj->ni", self.turn[body], points) + self.shift[body]
 
     def beyond(self, other: "Frames", points: np.ndarray, body: np.ndarray) -> np.ndarray:
         """How much further (n, dim) than other frames they move points; exact for translations."""

@@ -1,0 +1,372 @@
+"""Bodies that slide, turn and roll far: frames, history, forces that turn, and what is refused."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from solver.case.reader import load_case, parse_case
+from solver.lac.errors import SolveError
+from solver.mesh import generate
+from solver.simulation.motion import _joined, solve_moving
+from solver.simulation.options import LEAN
+from solver.simulation.scene.moved import Frames, _best_turn, rotation_by, rotation_vector
+from solver.simulation.simulate import simulate, solved
+from solver.system.errors import InputError
+from solver.system.progress import Clock
+from solver.verification.checks import run_checks
+from solver.verification.results import read_result, write_result
+from solver.verification.run import mesh_of
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+MESH = {
+    "recipe": "punch",
+    "bottom_size": [50.0, 10.0],
+    "top_size": [10.0, 10.0],
+    "bottom": {"cells": "QUAD4", "divisions": [10, 2]},
+    "top": {"cells": "QUAD8", "divisions": [3, 2]},
+}
+TEXT = {
+    "name": "moving",
+    "mesh": MESH,
+    "plane": "strain",
+    "motion": "large",
+    "materials": {"all": {"young": 2000.0, "poisson": 0.3}},
+    "supports": [
+        {"group": "base", "fix": ["x", "y"]},
+        {"at": [0.0, 10.0], "fix": {"x": 7.0}, "name": "pull"},
+    ],
+    "loads": [{"group": "press", "pressure": 2.5, "name": "press"}],
+    "steps": [{"press": 1, "pull": k} for k in (1, 2, 3, 1, 0)],
+    "contact": [{"name": "interface", "slave": "top_contact", "master": "bottom_contact"}],
+}
+
+
+def moving(**changes):
+    return parse_case(json.dumps(TEXT | changes), Path("moving.yaml"))
+
+
+def run(case):
+    return solved(case, mesh_of(case), LEAN, Clock())
+
+
+def whole(solution):
+    """The displacement from the mesh as given."""
+    return solution.motion + solution.displacement
+
+
+angles = st.floats(-3.0, 3.0)
+
+
+@given(st.integers(0, 2**31), st.tuples(angles, angles, angles))
+@settings(max_examples=50, deadline=None)
+def test_a_rotation_is_found_whatever_its_angle(seed, vector):
+    before = np.random.default_rng(seed).normal(size=(6, 3))
+    turn = Rotation.from_rotvec(vector).as_matrix()
+    found = _best_turn(before, before @ turn.T)
+    assert found == pytest.approx(turn, abs=1e-12)
+    assert rotation_by(rotation_vector(found), 3) == pytest.approx(found, abs=1e-12)
+
+
+def test_a_flat_surface_turns_without_a_reflection():
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 0]]) - [0.5, 1, 0]
+    turn = Rotation.from_rotvec([0.3, -0.8, 1.1]).as_matrix()
+    found = _best_turn(flat, flat @ turn.T)
+    assert found == pytest.approx(turn, abs=1e-12)
+    assert np.linalg.det(found) == pytest.approx(1.0)
+
+
+def test_frames_stay_orthogonal_over_many_steps():
+    frames, turn = Frames.still(1, 3), Rotation.from_rotvec([0.1, 0.2, -0.3]).as_matrix()
+    for _ in range(1000):
+        frames = frames.with_body(0, turn @ frames.turn[0], np.zeros(3))
+    assert frames.turn[0].T @ frames.turn[0] == pytest.approx(np.eye(3), abs=1e-14)
+
+
+def test_a_path_and_its_reverse_come_back():
+    """Without friction the last position is the first one again, far away in between."""
+    there = run(moving(steps=[{"press": 1, "pull": 0}]))
+    back = run(moving())
+    assert np.ptp([p.points[:, 0].max() for p in back.earlier]) == pytest.approx(0.0, abs=1e-12)
+    far = [float(p.at_points["motion"][:, 0].max()) for p in back.earlier]
+    assert far == pytest.approx([7, 14, 21, 7], rel=1e-12)
+    assert whole(back) == pytest.approx(whole(there), abs=1e-12)
+    assert back.zones[0].multiplier == pytest.approx(there.zones[0].multiplier, rel=1e-11)
+
+
+def pushed(angle, **changes):
+    """The upper block, pushed by its left side, which is turned with all the rest."""
+    along = [float(np.cos(np.radians(angle))), float(np.sin(np.radians(angle)))]
+    side = {"within": "top", "plane": {"point": [0.0, 0.0], "normal": along}}
+    held = [
+        {"group": "base", "fix": ["x", "y"]},
+        {"group": "left", "fix": {"normal": -7.0}, "name": "pull"},
+    ]
+    return moving(groups={"left": side}, supports=held, transform={"rotate": angle}, **changes)
+
+
+def pressures(solution):
+    earlier = [position.of_cells["pressure"] for position in solution.earlier]
+    cells = np.concatenate([values[~np.isnan(values)] for values in earlier])
+    return np.concatenate([cells, solution.zones[0].multiplier])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_the_same_pressures_whatever_way_the_assembly_is_turned(friction):
+    zone = {**TEXT["contact"][0], "friction": friction} if friction else TEXT["contact"][0]
+    plain = run(pushed(0.0, contact=[zone]))
+    for angle in (30.0, 120.0, 210.0):
+        found = run(pushed(angle, contact=[zone]))
+        assert pressures(found) == pytest.approx(pressures(plain), rel=1e-11)
+
+
+def test_work_of_the_path_is_strain_energy_and_friction():
+    """The rubbing block slides on by equal steps: its strain energy does not change."""
+    case = load_case(CASES / "motion/slide-c-friction.yaml")
+    solution = run(case)
+    work, rubbed = ([getattr(s, k) for s in solution.steps] for k in ("work", "dissipation"))
+    assert work[1:] == pytest.approx(rubbed[1:], rel=1e-11)
+    assert sum(work) > 0.9 * sum(rubbed)
+
+
+def test_pressure_turns_with_its_face_and_traction_does_not():
+    """A block turned by a right angle, pressed on a side: the reaction turns with the pressure."""
+    turned = [
+        {"at": [0.0, 10.0], "fix": {"x": 1.0}, "name": "x"},
+        {"at": [0.0, 10.0], "fix": {"y": 1.0}, "name": "y"},
+        {"at": [10.0, 10.0], "fix": {"x": 1.0}, "name": "x2"},
+        {"at": [10.0, 10.0], "fix": {"y": 1.0}, "name": "y2"},
+        {"group": "base", "fix": ["x", "y"]},
+    ]
+    # About (5, 5): (0, 10) goes to (0, 0), (10, 10) to (0, 10).
+    step = {"press": 1, "x": 0, "y": -10, "x2": -10, "y2": 0}
+    still = {"press": 1, "x": 0, "y": 0, "x2": 0, "y2": 0}
+    # The left side comes to lie on the lower block.
+    left = {"within": "top", "plane": {"point": [0.0, 0.0], "normal": [1.0, 0.0]}}
+    groups = {"left": left, "skin": ["top_contact", "left"]}
+    zone = {"name": "interface", "slave": "bottom_contact", "master": "skin"}
+    of_kind = {
+        "pressure": {"group": "press", "pressure": 2.5, "name": "press"},
+        "traction": {"group": "press", "traction": [0.0, -2.5], "name": "press"},
+    }
+    found = {}
+    for kind, load in of_kind.items():
+        posed = {"supports": turned, "loads": [load], "groups": groups, "contact": [zone]}
+        solution = run(moving(steps=[still, step], **posed))
+        assert not solution.ended
+        found[kind] = sum(r.force for r in solution.reactions)
+    assert found["pressure"] == pytest.approx([-25.0, 0.0], abs=1e-8)
+    assert found["traction"] == pytest.approx([0.0, 25.0], abs=1e-8)
+
+
+def test_springs_pull_back_from_where_they_were_made():
+    """A block slides by 20 on springs along x: the force is that of their whole length."""
+    spring = {"group": "press", "spring": {"x": 0.05}}
+    solution = run(moving(supports=[*TEXT["supports"], spring], steps=[{"press": 1, "pull": 3}]))
+    held = {r.group: r.force for r in solution.reactions}
+    assert held["springs"][0] == pytest.approx(-0.05 * 10 * 21, rel=1e-3)
+    top = np.isclose(solution.mesh.points[:, 1], 10.0)
+    drawn = whole(solution)[top & (solution.body == solution.body[np.argmax(top)]), 0]
+    assert drawn == pytest.approx(21, abs=0.1)
+
+
+def test_a_rigid_master_moves_by_its_finite_rotation():
+    """A rigid plane turned by a quarter presses a block from the other side."""
+    bodies = {
+        "wall": {
+            "plane": {"point": [5.0, 11.0], "normal": [0.0, -1.0]},
+            "reference": [5.0, 5.0],
+            "move": {"x": 0.0, "y": -1.01, "rz": 0.0},
+            "name": "wall",
+        }
+    }
+    mesh = {
+        "recipe": "bricks",
+        "bricks": [
+            {
+                "name": "block",
+                "low": [0.0, 0.0],
+                "high": [10.0, 10.0],
+                "block": {"cells": "QUAD4", "divisions": [2, 2]},
+            }
+        ],
+    }
+    planes = {"press": ([0.0, 10.0], [0.0, 1.0]), "base": ([0.0, 0.0], [0.0, 1.0])}
+    case = moving(
+        mesh=mesh,
+        bodies=bodies,
+        groups={n: {"plane": {"point": p, "normal": v}} for n, (p, v) in planes.items()},
+        supports=[{"group": "base", "fix": ["y"]}, {"at": [0.0, 0.0], "fix": ["x"]}],
+        loads=[],
+        steps=[{"wall": 1}],
+        contact=[{"name": "interface", "slave": "press", "master": "wall"}],
+    )
+    solution = run(case)
+    stiff = 2000 / (1 - 0.3**2)
+    assert solution.zones[0].multiplier == pytest.approx(stiff * 0.01 / 10, rel=1e-9)
+    (rigid,) = solution.rigid
+    assert rigid.translation == pytest.approx([0.0, -1.01], abs=1e-12)
+
+
+def test_a_block_is_pulled_up_a_slope():
+    """By 1.8 faces: the horizontal force is (tan α + μ)/(1 − μ tan α) of the weight."""
+    alpha, weight, mu = np.arctan(0.1), 10000.0, 0.3
+    end = [20 * np.cos(alpha) - 5 * np.sin(alpha), 20 * np.sin(alpha) + 5 * np.cos(alpha)]
+    case = moving(
+        mesh={**MESH, "bottom_size": [60.0, 5.0], "top_size": [20.0, 20.0]},
+        transform={"rotate": float(np.degrees(alpha))},
+        materials={"all": {"young": 2.0e7, "poisson": 0.3}},
+        bodies={"bottom": {"rigid": True}},
+        supports=[
+            {"group": "base", "fix": ["x", "y"]},
+            {"at": end, "fix": {"x": 3 * float(np.cos(alpha))}, "name": "pull"},
+        ],
+        loads=[{"group": "top", "body_force": [0.0, -weight / 400], "name": "press"}],
+        steps=[{"press": 1, "pull": k} for k in (1, 2, 3)],
+        contact=[{**TEXT["contact"][0], "friction": mu}],
+    )
+    solution = run(case)
+    ratio = (0.1 + mu) / (1 - 0.1 * mu)
+    for step in solution.steps:
+        force = step.resultants["interface"].force
+        assert force == pytest.approx([-ratio * weight, weight], rel=2e-5)
+    moved = whole(solution)[solution.body == solution.body[-1]]
+    assert solution.motion[:, 1].max() == pytest.approx(9 * np.sin(alpha), rel=1e-3)
+    assert np.isfinite(moved).all()
+
+
+def test_what_slid_off_ends_the_path_and_keeps_the_steps_before():
+    case = moving(steps=[{"press": 1, "pull": k} for k in (1, 9)])
+    solution = run(case)
+    assert solution.ended.startswith("step 2")
+    assert len(solution.steps) == 1
+    with pytest.raises(SolveError, match="step 2"):
+        simulate(case, generate(MESH, "moving"))
+
+
+def test_small_motion_is_that_of_linear_theory():
+    """Where bodies move by less than a tenth of a face, nothing is followed."""
+    small = [{"press": 1, "pull": 0.01}]
+    one, other = (run(moving(steps=small, motion=motion)) for motion in ("small", "large"))
+    assert other.displacement == pytest.approx(one.displacement, abs=1e-15)
+    assert not other.motion.any()
+    assert any("followed" in line.what for line in other.plan)
+    assert not any("followed" in line.what for line in one.plan)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"contact": [{**TEXT["contact"][0], "clearance": 0}]}, "contact[0].clearance"),
+        ({"probes": {"a": {"at": [1.0, 1.0]}}}, "probes.a.at"),
+        ({"supports": [{"group": "press", "together": ["y"]}]}, "supports[0].together"),
+        (
+            {"supports": [{"group": "farx", "cyclic": {"of": "symx", "shift": [1.0, 0.0]}}]},
+            "supports[0].cyclic",
+        ),
+        (
+            {"loads": [{"group": "top", "temperature": 1.0, "expansion": 1.0}]},
+            "loads[0].temperature",
+        ),
+        ({"loads": [{"group": "top", "strain": {"xx": 1.0}}]}, "loads[0].strain"),
+        (
+            {"reference": {"kind": "analytical", "displacement": [0.0, 0.0]}},
+            "reference.displacement",
+        ),
+    ],
+)
+def test_what_does_not_go_with_motion_is_refused_by_both_keys(changes, key):
+    plain = {
+        "steps": [1.0],
+        "supports": [{"group": "base", "fix": ["x", "y"]}],
+        "loads": [{"group": "press", "pressure": 2.5}],
+    }
+    with pytest.raises(InputError, match="`motion: large`") as error:
+        moving(**(plain | changes))
+    assert error.value.key == key
+
+
+def test_an_exact_solution_does_not_go_with_motion():
+    reference = {"kind": "analytical", "solution": "layers", "contact_pressure": "solution"}
+    with pytest.raises(InputError, match=r"reference\.solution"):
+        moving(reference=reference, steps=[1.0])
+
+
+def test_a_result_keeps_all_positions(tmp_path):
+    solution = run(moving(reference={"kind": "analytical", "contact_pressure": 2.5}))
+    write_result(tmp_path / "a.vtkhdf", solution, [], {})
+    found = read_result(tmp_path / "a.vtkhdf").solution
+    assert len(found.earlier) == 4
+    for one, other in zip(solution.earlier, found.earlier, strict=True):
+        assert np.array_equal(one.points, other.points)
+        for name, values in one.of_cells.items():
+            assert np.array_equal(values, other.of_cells[name], equal_nan=True), name
+    assert np.array_equal(solution.motion, found.motion)
+    assert np.array_equal(solution.mesh.points, found.mesh.points)
+    assert [step.work for step in found.steps] == [step.work for step in solution.steps]
+
+
+def test_a_wrong_pressure_at_an_earlier_position_is_noticed():
+    solution = run(load_case(CASES / "motion/slide-c-friction.yaml"))
+    checks = {check.name: check for check in run_checks(solution)}
+    assert checks["position_pressure"].passed
+    assert checks["position_friction"].passed
+    pressed = np.nanargmax(solution.earlier[2].of_cells["pressure"])
+    solution.earlier[2].of_cells["pressure"][pressed] *= 1 + 1e-9
+    solution.earlier[4].of_cells["friction_traction"][pressed, 0] += 1e-6
+    checks = {check.name: check for check in run_checks(solution)}
+    assert not checks["position_pressure"].passed
+    assert "step 3" in checks["position_pressure"].where
+
+
+def test_the_slip_of_all_steps_turns_with_the_slave():
+    """A body turned by a right angle after it slid: its whole slip turns with it."""
+    case = load_case(CASES / "motion/slide-c-friction.yaml")
+    solution = run(case)
+    total = solution.zones[0].friction.slip_total[:, 0]
+    assert total.max() == pytest.approx(2 * 5.0, rel=0.1)  # each face is passed by two columns
+    joined = _joined(case.until(1), [replace(solution, steps=solution.steps[:1], earlier=[])])
+    assert joined.validity == solution.validity
+
+
+FAULTS = {
+    "frames are not followed": (
+        "solver.simulation.motion._followed",
+        lambda rest, faces, old, new: old,
+        test_a_path_and_its_reverse_come_back,
+    ),
+    "pressure does not turn": (
+        "solver.simulation.scene.moved.Frames.turned",
+        lambda frames, vectors, body: vectors,
+        test_pressure_turns_with_its_face_and_traction_does_not,
+    ),
+    "springs are drawn from where bodies are": (
+        "solver.simulation.scene.moved.Moved.springs",
+        lambda moved: moved.rest.springs(),
+        test_springs_pull_back_from_where_they_were_made,
+    ),
+    "slip is counted from the start in each step": (
+        "solver.simulation.motion._Place.displacement",
+        property(lambda place: 0 * place.groups.motion),
+        test_work_of_the_path_is_strain_energy_and_friction,
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_are_noticed(monkeypatch, fault):
+    place, patch, noticing = FAULTS[fault]
+    monkeypatch.setattr(place, patch)
+    with pytest.raises(AssertionError):
+        noticing()
+
+
+def test_only_moving_cases_enter_motion(monkeypatch):
+    monkeypatch.setattr("solver.simulation.motion.solve_moving", None)
+    simulate(moving(motion="small", steps=[{"press": 1, "pull": 0.001}]), generate(MESH, "m"))
+    assert solve_moving is not None
