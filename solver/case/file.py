@@ -246,8 +246,13 @@ _SUPPORTS = "a list of {group, fix}, at least one"
 _STEPS = "a list of load factors, none negative, or of mappings of names to factors"
 _Factor = Annotated[float, Meta(ge=0, le=1e30)]
 _Factors = Annotated[dict[Name, Number], Meta(min_length=1)]
+MOST_STEPS = 1000
+"""A case has at most so many steps, those between included."""
 _STEP = "a factor from 0 to 1e30, or a mapping of names to factors"
 _Step = Annotated[_Factor | _Factors, Meta(description=_STEP)]
+_Steps = Annotated[
+    tuple[_Step, ...], Meta(min_length=1, max_length=MOST_STEPS, description=_STEPS)
+]
 _Tolerance = Annotated[float, Meta(gt=0, description="a positive number")]
 _TOLERANCE = (
     "a positive number below 1, or a mapping of checks (`all`: the relative ones) to such numbers"
@@ -294,6 +299,7 @@ class CaseFile(Section, frozen=True):
     directions: solved once, or again with slave and master exchanged
     steps: load factors, solved one after the other in any order, or the factors of named loads and
       supports
+    substeps: each step is reached in so many equal parts, from the one before it or from nothing
     motion: small, or large where bodies slide or roll far along the path of the steps, with small
       strains
     observe: macro-elements to report at every step
@@ -321,9 +327,10 @@ class CaseFile(Section, frozen=True):
     bodies: dict[Group, Rigid] = field(default_factory=dict)
     contact: tuple[Zone, ...] = ()
     directions: Literal["first", "both"] = "first"
-    steps: Annotated[tuple[_Step, ...], Meta(min_length=1, max_length=1000, description=_STEPS)] = (
-        1.0,
-    )
+    steps: Annotated[
+        tuple[_Step, ...], Meta(min_length=1, max_length=MOST_STEPS, description=_STEPS)
+    ] = (1.0,)
+    substeps: Annotated[int, Meta(ge=1, le=1000, description="a whole number from 1 to 1000")] = 1
     motion: Literal["small", "large"] = "small"
     observe: tuple[Observation, ...] = ()
     probes: dict[Name, Probe] = field(default_factory=dict)

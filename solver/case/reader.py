@@ -15,7 +15,7 @@ from msgspec import structs
 from ..system.errors import InputError, key_path
 from .acting import Load, Step, Support
 from .expressions import EXACT, Expression
-from .file import CaseFile
+from .file import MOST_STEPS, CaseFile
 from .material import Material
 from .model import MARGIN, STATE, Case, Selection
 from .rules import check_rules
@@ -135,12 +135,25 @@ class _Reader:
         """The load steps; those of an exact solution with a state for each."""
         states = self.solution.states if self.solution else ()
         if not states:
-            return self.file.steps
-        if "steps" in self.content:
-            allowed = "must be left out: the exact solution has a state for each step"
-            raise InputError(self.path, "steps", None, allowed)
+            return self.in_parts(self.file.steps, self.file.substeps)
+        for key in ("steps", "substeps"):
+            if key in self.content:
+                allowed = "must be left out: the exact solution has a state for each step"
+                raise InputError(self.path, key, None, allowed)
         names = [f"{STATE}{i + 1}" for i in range(len(states))]
         return tuple({name: float(name == now) for name in names} for now in names)
+
+    def in_parts(self, steps: tuple[Step, ...], count: int) -> tuple[Step, ...]:
+        """The steps with those on the way to each one, in `count` equal parts."""
+        if len(steps) * count > MOST_STEPS:
+            allowed = f"makes {len(steps) * count} steps; {MOST_STEPS} at most are allowed"
+            raise InputError(self.path, "substeps", count, allowed)
+        found, last = list[Step](), 0.0 if isinstance(steps[0], float) else dict[str, float]()
+        for step in steps:
+            found += [_between(last, step, part / count) for part in range(1, count)]
+            found.append(step)
+            last = step
+        return tuple(found)
 
     def tolerances(self) -> tuple[dict[str, float], dict[str, float]]:
         """The tolerances by check, and the expected errors from which some of them follow."""
@@ -250,6 +263,16 @@ class _Reader:
         """The function of position that a text is."""
         around = self.file.plane == "axisymmetric"
         return Expression(text, str(self.path), key_path(keys), axisymmetric=around)
+
+
+def _between(one: Step, other: Step, share: float) -> Step:
+    """The factors on the way from a step to another one; a name that one lacks is zero there."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        low = {name: one.get(name, 0.0) for name in other}
+        return {name: low[name] + share * (high - low[name]) for name, high in other.items()}
+    if isinstance(one, dict) or isinstance(other, dict):
+        return other  # refused later: steps are of one kind
+    return one + share * (other - one)
 
 
 def _only(values: Iterable[Any]) -> float | None:

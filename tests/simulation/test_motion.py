@@ -240,6 +240,56 @@ def test_a_block_is_pulled_up_a_slope():
     assert np.isfinite(moved).all()
 
 
+def punched(move, friction, **more):
+    """A rigid circle of radius 20 that presses a block by 0.2 and moves along it, in ten steps."""
+    block = {"cells": "QUAD4", "divisions": [40, 10]}
+    planes = {"top": ([0.0, 10.0], [0.0, 1.0]), "base": ([0.0, 0.0], [0.0, 1.0])}
+    zone = {"name": "interface", "slave": "top", "master": "punch", "friction": friction}
+    bricks = [{"name": "block", "low": [0.0, 0.0], "high": [40.0, 10.0], "block": block}]
+    circle = {"centre": [10.0, 29.8], "radius": 20.0}
+    return moving(
+        mesh={"recipe": "bricks", "bricks": bricks},
+        groups={n: {"plane": {"point": p, "normal": v}} for n, (p, v) in planes.items()},
+        supports=[{"group": "base", "fix": ["x", "y"]}],
+        loads=[],
+        bodies={"punch": {"sphere": circle, "move": move, "name": "go", **more}},
+        contact=[zone],
+        steps=[{"go": 1}],
+        substeps=10,
+    )
+
+
+def test_a_roller_that_sticks_goes_as_far_as_it_turns():
+    """By R θ, to the order of a/R; its x is free, and no force holds it along."""
+    case = punched({"y": 0.0, "rz": -1.0}, 0.5, force={"x": 0.0})
+    solution = run(replace(case, steps=({"go": 0.0}, *case.steps)))
+    gone = np.array([step.rigid[0].translation[0] for step in solution.steps])
+    turned = -np.array([step.rigid[0].rotation[2] for step in solution.steps])
+    assert np.diff(gone)[1:] == pytest.approx(20 * np.diff(turned)[1:], rel=0.01)
+    forces = [step.resultants["interface"].force[0] for step in solution.steps]
+    assert np.abs(forces).max() < 1e-8
+
+
+def test_ironing_has_one_force_in_the_middle_and_the_friction_of_its_path():
+    """T = μ N at every step; N differs little, and work is T times the way."""
+    solution = run(punched({"x": 20.0, "y": 0.0, "rz": 0.0}, 0.3))
+    forces = np.array([step.resultants["interface"].force for step in solution.steps])
+    assert forces[:, 0] / -forces[:, 1] == pytest.approx(0.3, rel=0.01)
+    assert np.ptp(forces[2:7, 1]) < 0.01 * abs(forces[5, 1])
+    for step, force in zip(solution.steps[2:7], forces[2:7], strict=True):
+        assert step.work == pytest.approx(2.0 * force[0], rel=0.02)
+        assert step.dissipation == pytest.approx(step.work, rel=0.1)
+
+
+def test_substeps_are_equal_parts_of_the_way():
+    steps = moving(steps=[{"press": 1, "pull": 1}, {"press": 1, "pull": 3}], substeps=2).steps
+    pulls = [step["pull"] for step in steps]
+    assert pulls == [0.5, 1, 2, 3]
+    assert [step["press"] for step in steps] == [0.5, 1, 1, 1]
+    with pytest.raises(InputError, match="makes 1002 steps"):
+        moving(steps=[{"press": 1, "pull": 1}] * 2, substeps=501)
+
+
 def test_what_slid_off_ends_the_path_and_keeps_the_steps_before():
     case = moving(steps=[{"press": 1, "pull": k} for k in (1, 9)])
     solution = run(case)

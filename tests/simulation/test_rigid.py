@@ -15,7 +15,7 @@ from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.judge import judge
-from tests.scenes import block_mesh, replaced
+from tests.scenes import block_mesh, replaced, solved
 
 YOUNG, POISSON = 2000.0, 0.3
 # Two blocks between a plane below and one above: y, or z, from −1 to 1.
@@ -308,3 +308,23 @@ def test_refused_surfaces_of_the_mesh(change, said):
     with pytest.raises(InputError) as refusal:
         simulate(case(change, text=text), with_die(block_mesh("QUAD4", "QUAD4", (1, 1)), "SEG2"))
     assert said in str(refusal.value)
+
+
+@pytest.mark.parametrize("centre", np.linspace(18.0, 18.5, 11))
+def test_dual_multipliers_where_a_face_sees_a_circle_from_one_point(centre):
+    text = f"""
+name: seen
+mesh:
+  recipe: bricks
+  bricks:
+    - {{name: block, low: [0.0, 0.0], high: [40.0, 10.0], block: {{cells: QUAD4, divisions: [40, 4]}}}}
+plane: strain
+materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
+groups:
+  top: {{plane: {{point: [0.0, 10.0], normal: [0.0, 1.0]}}}}
+  base: {{plane: {{point: [0.0, 0.0], normal: [0.0, 1.0]}}}}
+bodies: {{punch: {{sphere: {{centre: [{centre}, 14.8], radius: 5.0}}}}}}
+supports: [{{group: base, fix: [x, y]}}]
+contact: [{{name: interface, slave: top, master: punch, treatment: nodal_dual}}]
+"""
+    assert solved(text).zones[0].multiplier.max() > 0

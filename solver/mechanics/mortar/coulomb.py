@@ -15,6 +15,7 @@ solution methods, CMAME 92 (1991) 353–375.
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 # falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits.
 _MOST, _EXACT, _ENOUGH, _STALLED = 60, 1e-13, 1e-9, 0.3
 _LATE, _ROUNDED = 15, 1e-6
+# A coefficient with which all that is closed sticks.
+_ROUGH = 1e6
 UNIQUE = 1.0
 """Up to this coefficient the first state found is taken for the only one."""
 # A step of the line search is halved down to this.
@@ -74,9 +77,10 @@ class CoulombContact:
     def solve(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Forces λ (r,), jumps z (r,) and the iterations, for λ₀ = `forces` (r,); None where none.
 
-        From z = 0 by plain steps, else from where all is closed and slips, as after a long way,
-        else with a line search. Where μ is above 1 there may be several states: then from both, and
-        the state in which most of the contact stays closed is taken.
+        From z = 0 by plain steps; else from where all is closed and slips, as after a long way;
+        else from where all that is closed sticks; else with a line search. Where μ is above 1 there
+        may be several states: then from the first two, and the state in which most of the contact
+        stays closed is taken.
 
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
@@ -92,6 +96,8 @@ class CoulombContact:
         found = [self._newton(rest, start, False)]
         if self.friction.max(initial=0.0) > UNIQUE or not found[0]:
             found.append(self._newton(self._sliding(start), start, False))
+        if not any(found) and (stuck := self._sticking(start)) is not None:
+            found = [self._newton(stuck, start, False) or self._newton(stuck, start, True)]
         if not any(found):
             found = [self._newton(rest, start, True)]
         known = [one for one in found if one is not None]
@@ -99,6 +105,13 @@ class CoulombContact:
             return None
         law, z, count = max(known, key=lambda one: int(one[0].closed.sum()))
         return law.forces * size, z * size, count
+
+    def _sticking(self, start: np.ndarray) -> np.ndarray | None:
+        """The jumps z (r,) where all that is closed sticks, however large its traction."""
+        rough = copy(self)
+        rough.friction = np.full_like(self.friction, _ROUGH)
+        found = rough._newton(np.zeros(len(start)), start, False)
+        return None if found is None else found[1]
 
     def _sliding(self, start: np.ndarray) -> np.ndarray:
         """The jumps z (r,) with all closed and slipping the way that the forces at rest pull."""

@@ -210,6 +210,8 @@ def dual(data: InterfaceData) -> Multipliers:
                 part = np.einsum("sq,sqi,sqj->sij", segments.weight, side.values, side.values)
                 np.add.at(mass, side.face, part)
         few = mass.sum(axis=(1, 2)) < _FEW * whole.sum(axis=(1, 2))
+        # A rigid surface may be seen from one point alone.
+        few |= np.linalg.matrix_rank(mass, hermitian=True) < block.type.n_nodes
         mass[few] = whole[few]
         # Rows of M sum to ∫ N, since the functions sum to one.
         diagonal = np.eye(block.type.n_nodes) * mass.sum(axis=2)[:, None]
