@@ -6,6 +6,7 @@ it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 RELATIVE = 1e-3
 GAP = 2e-5
@@ -46,6 +47,10 @@ class Check:
     def verifies(self) -> bool:
         """Whether the check compares the solution with a reference."""
         return self.key is not None or self.norm == "error"
+
+    def concerns(self, case: Any) -> bool:
+        """Whether a case is what it must be for the check to run."""
+        return not self.when or bool(getattr(case, self.when))
 
     def tolerance_in(self, overrides: Mapping[str, float]) -> float:
         """The tolerance under a case's overrides: by check, or `all`.

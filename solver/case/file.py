@@ -250,9 +250,7 @@ MOST_STEPS = 1000
 """A case has at most so many steps, those between included."""
 _STEP = "a factor from 0 to 1e30, or a mapping of names to factors"
 _Step = Annotated[_Factor | _Factors, Meta(description=_STEP)]
-_Steps = Annotated[
-    tuple[_Step, ...], Meta(min_length=1, max_length=MOST_STEPS, description=_STEPS)
-]
+_Steps = Annotated[tuple[_Step, ...], Meta(min_length=1, max_length=MOST_STEPS, description=_STEPS)]
 _Tolerance = Annotated[float, Meta(gt=0, description="a positive number")]
 _TOLERANCE = (
     "a positive number below 1, or a mapping of checks (`all`: the relative ones) to such numbers"

@@ -283,8 +283,11 @@ class Compared:
         asked = [
             check.name
             for check in CHECKS
-            if (check.key in case.reference if check.key else check.name == "balance")
-            or (check.norm == "error" and check.name in case.tolerance)
+            if check.concerns(case)
+            and (
+                (check.key in case.reference if check.key else check.name == "balance")
+                or (check.norm == "error" and check.name in case.tolerance)
+            )
         ]
         observed = not case.observe
         return [n for n in asked if n not in ran and not (observed and n.startswith("observ"))]

@@ -114,7 +114,7 @@ def run_checks(
     results = []
     for check in CHECKS:
         reference: samples.Reference = solution.case.reference.get(check.key) if check.key else 0.0
-        if reference is None or (check.when and not getattr(solution.case, check.when)):
+        if reference is None or not check.concerns(solution.case):
             continue
         sampler = sampler_of(check) if samplers is None else samplers.get(check.name)
         if sampler is None:

@@ -141,7 +141,7 @@ def _raising(error):
 
 def test_a_file_that_cannot_be_written_is_2_with_one_line(small, capsys, monkeypatch):
     monkeypatch.setattr(
-        solver.verification.run, "assembled", _raising(AssertionError("solved for nothing"))
+        solver.verification.run, "solved", _raising(AssertionError("solved for nothing"))
     )
     for command in ("mesh", "solve"):
         output = small / "c.yaml" / "r.vtkhdf"
@@ -150,9 +150,7 @@ def test_a_file_that_cannot_be_written_is_2_with_one_line(small, capsys, monkeyp
 
 
 def test_a_solve_that_fails_is_3_with_one_line(small, capsys, monkeypatch):
-    monkeypatch.setattr(
-        solver.verification.run, "assembled", _raising(SolveError("no convergence"))
-    )
+    monkeypatch.setattr(solver.verification.run, "solved", _raising(SolveError("no convergence")))
     status, verdict = solve(small)
     assert (status, verdict["verdict"], verdict["reason"]) == (3, "failed", "no convergence")
     assert capsys.readouterr().err == f"{small / 'c.yaml'}: no convergence\n"
@@ -161,7 +159,7 @@ def test_a_solve_that_fails_is_3_with_one_line(small, capsys, monkeypatch):
 
 def test_a_bug_is_70_with_a_traceback(small, capsys, monkeypatch):
     monkeypatch.setattr(
-        solver.verification.run, "assembled", _raising(ZeroDivisionError("of\nnothing"))
+        solver.verification.run, "solved", _raising(ZeroDivisionError("of\nnothing"))
     )
     status, verdict = solve(small)
     assert (status, verdict["verdict"]) == (70, "crashed")
@@ -170,7 +168,7 @@ def test_a_bug_is_70_with_a_traceback(small, capsys, monkeypatch):
 
 
 def test_an_interruption_is_130_and_quiet(small, capsys, monkeypatch):
-    monkeypatch.setattr(solver.verification.run, "assembled", _raising(KeyboardInterrupt()))
+    monkeypatch.setattr(solver.verification.run, "solved", _raising(KeyboardInterrupt()))
     assert main(["solve", str(small / "c.yaml"), "-o", str(small / "r.vtkhdf")]) == 130
     assert capsys.readouterr() == ("", "")
 

@@ -317,7 +317,10 @@ name: seen
 mesh:
   recipe: bricks
   bricks:
-    - {{name: block, low: [0.0, 0.0], high: [40.0, 10.0], block: {{cells: QUAD4, divisions: [40, 4]}}}}
+    - name: block
+      low: [0.0, 0.0]
+      high: [40.0, 10.0]
+      block: {{cells: QUAD4, divisions: [40, 4]}}
 plane: strain
 materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
 groups:

@@ -1,0 +1,76 @@
+"""Frames of bodies that move far, and what does not go with `motion: large`."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from solver.simulation.scene.moved import Frames, _best_turn, rotation_by, rotation_vector
+from solver.system.errors import InputError
+from tests.simulation.test_motion import TEXT, moving
+
+angles = st.floats(-3.0, 3.0)
+
+
+@given(st.integers(0, 2**31), st.tuples(angles, angles, angles))
+@settings(max_examples=50, deadline=None)
+def test_a_rotation_is_found_whatever_its_angle(seed, vector):
+    before = np.random.default_rng(seed).normal(size=(6, 3))
+    turn = Rotation.from_rotvec(vector).as_matrix()
+    found = _best_turn(before, before @ turn.T)
+    assert found == pytest.approx(turn, abs=1e-12)
+    assert rotation_by(rotation_vector(found), 3) == pytest.approx(found, abs=1e-12)
+
+
+def test_a_flat_surface_turns_without_a_reflection():
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 0]]) - [0.5, 1, 0]
+    turn = Rotation.from_rotvec([0.3, -0.8, 1.1]).as_matrix()
+    found = _best_turn(flat, flat @ turn.T)
+    assert found == pytest.approx(turn, abs=1e-12)
+    assert np.linalg.det(found) == pytest.approx(1.0)
+
+
+def test_frames_stay_orthogonal_over_many_steps():
+    frames, turn = Frames.still(1, 3), Rotation.from_rotvec([0.1, 0.2, -0.3]).as_matrix()
+    for _ in range(1000):
+        frames = frames.with_body(0, turn @ frames.turn[0], np.zeros(3))
+    assert frames.turn[0].T @ frames.turn[0] == pytest.approx(np.eye(3), abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"contact": [{**TEXT["contact"][0], "clearance": 0}]}, "contact[0].clearance"),
+        ({"probes": {"a": {"at": [1.0, 1.0]}}}, "probes.a.at"),
+        ({"supports": [{"group": "press", "together": ["y"]}]}, "supports[0].together"),
+        (
+            {"supports": [{"group": "farx", "cyclic": {"of": "symx", "shift": [1.0, 0.0]}}]},
+            "supports[0].cyclic",
+        ),
+        (
+            {"loads": [{"group": "top", "temperature": 1.0, "expansion": 1.0}]},
+            "loads[0].temperature",
+        ),
+        ({"loads": [{"group": "top", "strain": {"xx": 1.0}}]}, "loads[0].strain"),
+        (
+            {"reference": {"kind": "analytical", "displacement": [0.0, 0.0]}},
+            "reference.displacement",
+        ),
+    ],
+)
+def test_what_does_not_go_with_motion_is_refused_by_both_keys(changes, key):
+    plain = {
+        "steps": [1.0],
+        "supports": [{"group": "base", "fix": ["x", "y"]}],
+        "loads": [{"group": "press", "pressure": 2.5}],
+    }
+    with pytest.raises(InputError, match="`motion: large`") as error:
+        moving(**(plain | changes))
+    assert error.value.key == key
+
+
+def test_an_exact_solution_does_not_go_with_motion():
+    reference = {"kind": "analytical", "solution": "layers", "contact_pressure": "solution"}
+    with pytest.raises(InputError, match=r"reference\.solution"):
+        moving(reference=reference, steps=[1.0])
