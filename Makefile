@@ -174,12 +174,11 @@ $(SITE):
 	@$(PYTHON) -Es -m venv --clear .venv
 
 PIP = $(ALONE) pip install --quiet --disable-pip-version-check --no-input --no-compile \
-	--no-cache-dir --require-hashes --only-binary :all: --requirement
-# One package is published as source only; it is built with the tools of requirements-build.txt.
-$(SITE)/installed-run: requirements.txt requirements-build.txt | $(SITE)
+	--no-cache-dir --no-deps --require-hashes --only-binary :all: --requirement
+# The files name all packages that are needed, and no others.
+$(SITE)/installed-run: requirements.txt | $(SITE)
 	@echo "Installing requirements.txt into .venv …"
-	@$(PIP) requirements-build.txt
-	@$(PIP) requirements.txt --no-binary connection-pool --no-build-isolation
+	@$(PIP) requirements.txt
 	@-$(ALONE) compileall -q -q -j 0 .venv/lib
 	@touch $@
 
@@ -228,14 +227,15 @@ bill: bill-environment ## write the bill of materials: every installed package a
 	@echo "Bill of materials: $(BILL)"
 
 LOCK := $(ALONE) uv pip compile --quiet --universal --python-version 3.11 \
-	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock'
+	--generate-hashes --no-emit-index-url --no-annotate --custom-compile-command 'make lock' \
+	--no-emit-package connection-pool --no-emit-package pulp
 
 lock: lock-environment ## lock the packages of pyproject.toml again: make lock ARGS=--upgrade
 	@$(LOCK) $(ARGS) pyproject.toml --group pyproject.toml:batch \
 	  --output-file requirements.txt
 	@for code in kratos ngsolve; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$code --output-file requirements-$$code.txt || exit; done
-	@for group in build slurm test lint docs bill lock; do \
+	@for group in slurm test lint docs bill lock; do \
 	  $(LOCK) $(ARGS) --group pyproject.toml:$$group --constraint requirements.txt \
 	    --output-file requirements-$$group.txt || exit; done
 

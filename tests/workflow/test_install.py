@@ -117,7 +117,7 @@ def test_packages_are_installed_again_when_a_lock_changes(tmp_path):
     (tmp_path / "requirements-test.txt").touch()
     planned = make(tmp_path, sys.executable, "-n", "test-environment").stdout
     assert re.findall(r"Installing (\S+)", planned) == ["requirements-test.txt"]
-    (tmp_path / "requirements-build.txt").touch()
+    (tmp_path / "requirements.txt").touch()
     planned = make(tmp_path, sys.executable, "-n", "environment").stdout
     assert re.findall(r"Installing (\S+)", planned) == ["requirements.txt"]
 
