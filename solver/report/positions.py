@@ -31,7 +31,7 @@ def positions(row: Row) -> Chart | str:
         f"{row.name}: contact over the steps",
         records,
         Axis("step", "step"),
-        Axis("value", with_unit("pressure", unit)),
+        Axis("value", with_unit("pressure", unit), zero=True),
         _LOOKS,
         tips={"zone": "zone"},
         height=200,

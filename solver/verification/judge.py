@@ -35,7 +35,7 @@ from .verdict import (
 
 if TYPE_CHECKING:
     from ..case.model import Case
-    from ..simulation.results.solution import Solution
+    from ..simulation.results.solution import Solution, ZoneResult
 
 NOT_VERIFIED = "not verified: compared with no reference"
 NOT_JUDGED = "not verified: the tolerances belong to another recovery"
@@ -113,7 +113,7 @@ def judge(
         **asdict(solution.validity),
         pressure_within=None if scatters else _pressure_within(solution),
         seconds={**seconds, "total": seconds.get("total", sum(seconds.values()))},
-        pressure=_extremes(zone.multiplier for zone in zones),
+        pressure=_extremes(_where_covered(zone) for zone in zones),
         stress=_extremes([solution.nodal_normal_stress[solution.body >= 0]]),
         gap=_extremes(zone.gap for zone in zones),
         status=_extremes(zone.closed.astype(int) for zone in zones),
@@ -243,6 +243,12 @@ def _extremes(arrays: Iterable[np.ndarray]) -> list[Any] | None:
         return None
     joined = np.concatenate(values)
     return [joined.min().item(), joined.max().item()]
+
+
+def _where_covered(zone: ZoneResult) -> np.ndarray:
+    """The pressures of macro-elements that have a master, or of all where none has one."""
+    there = zone.coverage > 0
+    return zone.multiplier[there] if there.any() else zone.multiplier
 
 
 def _worst(checks: Sequence[CheckResult]) -> CheckError | None:

@@ -271,7 +271,7 @@ MUTANTS = (
            "simulation.scene.holdings.rigid:_frame",
            changed(lambda f: replace(f, motions={**f.motions, "rz": f.motions["rz"] + 1.0}))),
     Mutant("rigid-radius", "a rigid circle is too flat by 0.1 %", SHAFT,
-           "simulation.scene.operators:_surface_of",
+           "simulation.scene.attributes:Attributes.surface",
            changed(lambda q: q and replace(q, curvature=0.999 * q.curvature))),
     Mutant("layer-side", "rigid lines look away from the slave", LINES,
            "simulation.scene.holdings.rigid_surfaces:turned",

@@ -91,8 +91,8 @@ def shared_nodes_free(true: Wrapped) -> Wrapped:
 
 
 def never_closing(true: Wrapped) -> Wrapped:
-    def constraints(scene: Any) -> Any:
-        found = true(scene)
+    def constraints(*about: Any) -> Any:
+        found = true(*about)
         found.eligible[len(found.eligible) // 2] = False
         return found
 
