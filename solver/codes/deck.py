@@ -79,7 +79,7 @@ def split(free: FreeMotion, dim: int) -> tuple[np.ndarray, list[Oblique]]:
 def _reduced(rows: np.ndarray) -> Iterable[tuple[np.ndarray, int]]:
     """Rows that say the same, each with the axis whose coefficient is 1 there and 0 elsewhere.
 
-    >>> [(row.tolist(), axis) for row, axis in _reduced(np.array([[0.6, 0.8, 4.0]]))]
+    >>> [(row.tolist(), axis) for row, axis in _reduced(np.array([[3.0, 4.0, 20.0]]))]
     [([0.75, 1.0, 5.0], 1)]
     """
     rows, axes = rows.copy(), []

@@ -119,7 +119,7 @@ def from_vertices(
     Of `points` (n_nodes, dim). Vertices stay, and nodes `_LONG` times further from their vertices
     than the nearest node from one of these.
 
-    >>> from ...mesh.catalogue import BY_NAME
+    >>> from ...lac.cells.catalogue import BY_NAME
     >>> kind = BY_NAME["TRIA6"]
     >>> cell = Block(kind, np.arange(6)[None], np.ones(1), np.ones(1))
     >>> from_vertices(kind.nodes, [cell])[1].toarray()[3:, :3].tolist()

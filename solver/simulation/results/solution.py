@@ -67,7 +67,7 @@ class NodalContact:
 class RecoveredPressure:
     """A pressure p* = p + Σ c ψ by macro-element (m,), recovered from the constants p.
 
-    `form`: linear, quadratic or smooth (`mechanics.mortar.reconstruction`); `coefficients` c
+    `form`: linear, quadratic or smooth (`lac.reconstruction`); `coefficients` c
     (m, k), `degree` (m,) of the polynomials; `centre`, `axes`, `spread` are those of the local
     coordinates that ψ is written in. `nodes` (n,) of the slave surface and `at_nodes` (n,), the
     mean there of p* on the faces around.
