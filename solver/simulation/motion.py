@@ -108,7 +108,7 @@ def _placed(
                 raise
             raise SolveError(f"{error.key}: {error.problem}") from None
         with stage(clock, "solve"):
-            state, field = _solved(problem)
+            state, field = _solved(problem, last.state if last else None)
         wanted, _ = predicted(rest, step, settled(groups, state.displacement, held))
         following = _followed(rest, faces, frames, wanted)
         moves = (following.turn != frames.turn).any(axis=(1, 2))
@@ -120,16 +120,23 @@ def _placed(
     raise SolveError(f"{body_names(scene)[int(moves.argmax())]} finds no place: it still moves")
 
 
-def _solved(problem: ContactProblem) -> tuple[Equilibrium, Recovered]:
+def _solved(problem: ContactProblem, last: Equilibrium | None) -> tuple[Equilibrium, Recovered]:
     """The state of a problem, and its recovered pressure."""
     if problem.scene.case.frictional:
         from .equilibrium.friction_recovery import solve_and_recover  # friction alone
 
-        return solve_and_recover(problem, _STEP, None)
+        return solve_and_recover(problem, _STEP, from_there(last) if last else None)
     state = problem.solve(_STEP)
     if (state.trial.violation(state.iterate.closed) > 1).any():
         raise SolveError("contact bears tension or surfaces overlap")
     return recovered(problem, state, _STEP)
+
+
+def from_there(state: Equilibrium) -> Equilibrium:
+    """A state from which slips are counted anew, as the step's displacement has those before."""
+    assert state.friction is not None
+    none = np.zeros_like(state.friction.jump)
+    return replace(state, friction=replace(state.friction, jump=none, total=none))
 
 
 def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames) -> Frames:

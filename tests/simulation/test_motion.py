@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
@@ -247,6 +248,55 @@ def test_ironing_has_one_force_in_the_middle_and_the_friction_of_its_path():
     for step, force in zip(solution.steps[2:7], forces[2:7], strict=True):
         assert step.work == pytest.approx(2.0 * force[0], rel=0.02)
         assert step.dissipation == pytest.approx(step.work, rel=0.1)
+
+
+def test_a_ring_that_turns_rubs_by_its_pressure():
+    """Its moment is μ p 2πr², at every angle that it slid to, to the error of its polygons."""
+    case = load_case(CASES / "motion/rings.yaml")
+    zones = (structs.replace(case.zones[0], friction=0.2),)
+    solution = run(replace(case, zones=zones, reference={}, expected={}))
+    pressure = case.reference["contact_pressure"]
+    for step in solution.steps[1:]:
+        moment = step.resultants["interface"].moment[2]
+        assert moment == pytest.approx(-0.2 * pressure * 2 * np.pi * 10**2, rel=0.01)
+
+
+def test_a_ring_slides_along_its_axis_in_a_rigid_sleeve():
+    """Without friction nothing changes on the way; with it the force is that of μ p."""
+    bricks = [
+        ("ring", [20.0, 0.0], [30.0, 10.0], "QUAD8", [4, 4]),
+        ("sleeve", [30.0, -40.0], [35.0, 60.0], "QUAD4", [1, 40]),
+    ]
+    sides = {"outer": ("ring", 30.0), "bore": ("ring", 20.0), "inside": ("sleeve", 30.0)}
+    radial = {
+        name: {"within": body, "plane": {"point": [x, 0.0], "normal": [1.0, 0.0]}}
+        for name, (body, x) in sides.items()
+    }
+    foot = {"within": "ring", "plane": {"point": [0.0, 0.0], "normal": [0.0, 1.0]}}
+    blocks = [
+        {"name": n, "low": low, "high": high, "block": {"cells": cells, "divisions": parts}}
+        for n, low, high, cells, parts in bricks
+    ]
+    for friction in (0.0, 0.2):
+        zone = {"name": "interface", "slave": "outer", "master": "inside", "friction": friction}
+        solution = run(
+            moving(
+                mesh={"recipe": "bricks", "bricks": blocks},
+                plane="axisymmetric",
+                groups={**radial, "foot": foot},
+                bodies={"sleeve": {"rigid": True, "move": {"y": 30.0}, "name": "go"}},
+                supports=[{"group": "foot", "fix": ["y"]}],
+                loads=[{"group": "bore", "pressure": 25.0, "name": "press"}],
+                steps=[{"press": 1, "go": 0}, {"press": 1, "go": 1}],
+                contact=[zone],
+            )
+        )
+        first, last = (step.resultants["interface"] for step in solution.steps)
+        assert solution.rigid[0].translation == pytest.approx([0.0, 30.0])
+        if friction:
+            assert last.force[1] == pytest.approx(-friction * last.force[0], rel=1e-10)
+        else:
+            assert last.force == pytest.approx(first.force, abs=1e-8)
 
 
 def test_substeps_are_equal_parts_of_the_way():

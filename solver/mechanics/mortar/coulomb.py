@@ -14,9 +14,11 @@ Source: Alart, Curnier, A mixed formulation for frictional contact problems pron
 solution methods, CMAME 92 (1991) 353–375.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass
+from itertools import islice
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -31,6 +33,8 @@ UNIQUE = 1.0
 """Up to this coefficient the first state found is taken for the only one."""
 # A step of the line search is halved down to this.
 _SHORTEST = 1e-3
+# The share of the way that is tried first, and the smallest.
+_FIRST, _SMALLEST = 0.1, 1e-4
 # Where S is a product: the fault that Newton's method ends with, the shares of a fault that GMRES
 # leaves of a large one and at most, its restart and restarts.
 _INEXACT, _SHARE, _LARGEST, _RESTART, _RESTARTS = 1e-6, 0.1, 1e-2, 200, 5
@@ -49,6 +53,10 @@ class _Law:
     slips: np.ndarray
     unit: np.ndarray
     share: np.ndarray
+
+
+_Found: TypeAlias = tuple[_Law, np.ndarray, int]
+"""The law fulfilled, its z (r,), and the steps."""
 
 
 class CoulombContact:
@@ -74,13 +82,19 @@ class CoulombContact:
         for rows in self.rows:
             self.c[rows] = np.mean([np.abs(diagonal)[each] for each in self.rows], axis=0)
 
-    def solve(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int] | None:
+    def solve(
+        self,
+        forces: np.ndarray,
+        guess: np.ndarray | float = 0.0,
+        last: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Forces λ (r,), jumps z (r,) and the iterations, for λ₀ = `forces` (r,); None where none.
 
-        From z = 0 by plain steps; else from where all is closed and slips, as after a long way;
-        else from where all that is closed sticks; else with a line search. Where μ is above 1 there
-        may be several states: then from the first two, and the state in which most of the contact
-        stays closed is taken.
+        From z = `guess` (r,) by plain steps; else from where all is closed and slips, as after a
+        long way; else from where all that is closed sticks; else with a line search; else by way of
+        forces between the `last` ones (r,) and λ₀, or of larger coefficients. Where μ is above 1
+        there may be several states: then from the first two, and the state in which most of the
+        contact stays closed is taken.
 
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
@@ -92,19 +106,43 @@ class CoulombContact:
         ([2.0, 1.0], [0.5])
         """
         size = np.abs(forces).max(initial=0.0) or 1.0
-        start, rest = forces / size, np.zeros(len(forces))
-        found = [self._newton(rest, start, False)]
-        if self.friction.max(initial=0.0) > UNIQUE or not found[0]:
-            found.append(self._newton(self._sliding(start), start, False))
-        if not any(found) and (stuck := self._sticking(start)) is not None:
-            found = [self._newton(stuck, start, False) or self._newton(stuck, start, True)]
-        if not any(found):
-            found = [self._newton(rest, start, True)]
-        known = [one for one in found if one is not None]
+        start, rest = forces / size, np.zeros(len(forces)) + guess / size
+        attempts = self._attempts(rest, start, None if last is None else last / size)
+        several = bool(self.friction.max(initial=0.0) > UNIQUE)
+        known = list(filter(None, islice(attempts, 1 + several)))
+        known = known or list(islice(filter(None, attempts), 1))
         if not known:
             return None
         law, z, count = max(known, key=lambda one: int(one[0].closed.sum()))
         return law.forces * size, z * size, count
+
+    def _attempts(
+        self, rest: np.ndarray, start: np.ndarray, last: np.ndarray | None
+    ) -> Iterator[_Found | None]:
+        """What Newton's method finds in the ways that `solve` names, each tried when asked for."""
+        yield self._newton(rest, start, False)
+        yield self._newton(self._sliding(start), start, False)
+        stuck = self._sticking(start)
+        if stuck is not None:
+            yield self._newton(stuck, start, False)
+            yield self._newton(stuck, start, True)
+        yield self._newton(rest, start, True)
+        if last is not None:
+            yield self._along(last, start)
+        if stuck is not None:
+            yield self._by_friction(stuck, start)
+
+    def _by_friction(self, z: np.ndarray, start: np.ndarray) -> _Found | None:
+        """The law fulfilled by way of larger coefficients, from all sticking at `z` (r,) on."""
+        other, power, step, found = copy(self), np.log(_ROUGH), 1.0, None
+        while power > 0:
+            after = max(power - step, 0.0)
+            other.friction = self.friction * np.exp(after)
+            if (found := other._newton(z, start, False)) is not None:
+                z, power, step = found[1], after, 2 * step
+            elif (step := step / 2) < _SMALLEST:
+                return None
+        return found
 
     def _sticking(self, start: np.ndarray) -> np.ndarray | None:
         """The jumps z (r,) where all that is closed sticks, however large its traction."""
@@ -112,6 +150,18 @@ class CoulombContact:
         rough.friction = np.full_like(self.friction, _ROUGH)
         found = rough._newton(np.zeros(len(start)), start, False)
         return None if found is None else found[1]
+
+    def _along(self, last: np.ndarray, start: np.ndarray) -> _Found | None:
+        """The law fulfilled on the way from the `last` forces on, in steps as large as succeed."""
+        z, share, step, found = np.zeros(len(start)), 0.0, _FIRST, None
+        while share < 1.0:
+            after = min(share + step, 1.0)
+            found = self._newton(z, (1 - after) * last + after * start, False)
+            if found is not None:
+                z, share, step = found[1], after, 2 * step
+            elif (step := step / 2) < _SMALLEST:
+                return None
+        return found
 
     def _sliding(self, start: np.ndarray) -> np.ndarray:
         """The jumps z (r,) with all closed and slipping the way that the forces at rest pull."""
@@ -128,9 +178,7 @@ class CoulombContact:
         z[rows] = self._solved(fault, rows, bound * start[of] - start[rows])
         return z
 
-    def _newton(
-        self, z: np.ndarray, start: np.ndarray, searches: bool
-    ) -> tuple[_Law, np.ndarray, int] | None:
+    def _newton(self, z: np.ndarray, start: np.ndarray, searches: bool) -> _Found | None:
         """The law fulfilled, its z (r,), and the steps from `z` on; `searches`: along each step."""
         best, exact = np.inf, _EXACT if isinstance(self.stiffness, np.ndarray) else _INEXACT
         for count in range(_MOST):

@@ -41,6 +41,7 @@ class Search:
         # Slip is what the jumps have more than those of the last step.
         self.jump = last.jump if last else np.zeros(len(numbers))
         self.total = last.total if last else np.zeros(len(numbers))
+        self.last = before.pressure if before else None
         self.count = 0
 
     def settled(self, correction: np.ndarray | float = 0.0) -> Equilibrium:
@@ -51,7 +52,10 @@ class Search:
         base, contact = self.problem.constraints, self._contact
         area = base.covered[base.eligible]
         start = self._imposed(np.zeros(len(area)), correction)
-        solution = contact.solve(area * start.pressure[base.eligible])
+        # Bodies that went on slip by about as much.
+        gone = np.where(base.normal, 0.0, base.initial)[base.eligible] / area
+        last = None if self.last is None else area * self.last[base.eligible]
+        solution = contact.solve(area * start.pressure[base.eligible], gone, last)
         if solution is None:
             raise SolveError(self._why_none())
         _, z, steps = solution
@@ -89,6 +93,7 @@ class Search:
         nothing = np.zeros(len(self.jump), dtype=bool)
         if moves := self.problem.free_motion(nothing):
             words = "the loads part the bodies or overcome friction, or a support is missing"
+            words += "; smaller steps may find one (substeps)"
             return f"{moves} once its contact opens or slips: {words}"
         return "no frictional equilibrium found"
 

@@ -1,0 +1,79 @@
+"""States of friction that Newton's method finds by a way of its own."""
+
+import pytest
+
+from tests.scenes import solved
+
+
+@pytest.mark.parametrize("friction", [0.5, 0.3, 0.2, 0.1, 0.05])
+def test_a_free_punch_that_is_pressed_in_finds_its_place(friction):
+    """A rigid circle presses a block and is free along it: friction alone holds it, evenly."""
+    text = f"""
+name: pressed
+mesh:
+  recipe: bricks
+  bricks:
+    - name: block
+      low: [0.0, 0.0]
+      high: [40.0, 10.0]
+      block: {{cells: QUAD4, divisions: [80, 20]}}
+plane: strain
+materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
+groups:
+  top: {{plane: {{point: [0.0, 10.0], normal: [0.0, 1.0]}}}}
+  base: {{plane: {{point: [0.0, 0.0], normal: [0.0, 1.0]}}}}
+bodies:
+  punch: {{sphere: {{centre: [10.0, 29.9], radius: 20.0}}, move: {{rz: 0.0}}, force: {{x: 0.0}}}}
+supports: [{{group: base, fix: [x, y]}}]
+contact: [{{name: interface, slave: top, master: punch, friction: {friction}}}]
+"""
+    (zone,) = solved(text).zones
+    pressed = zone.multiplier > 0
+    assert pressed.sum() > 3
+    force = zone.resultants.force
+    assert abs(force[0]) < 1e-9 * abs(force[1])
+
+
+def test_a_block_between_two_slides_after_it_was_pressed():
+    """Pressed, then pulled by far more than it can stick: the cap goes along, the lower one not."""
+    bricks = {
+        "low": (0.0, 60.0, "QUAD4"),
+        "mid": (10.0, 20.0, "QUAD8"),
+        "cap": (20.0, 20.0, "TRIA6"),
+    }
+    lines = "".join(
+        f"    - {{name: {n}, low: [0.0, {y}], high: [{x}, {y + 10}], block: {{cells: {cells}, "
+        f"divisions: [{3 if n != 'low' else 12}, 2]}}}}\n"
+        for n, (y, x, cells) in bricks.items()
+    )
+    planes = {"lt": ("low", 10), "mu": ("mid", 10), "mt": ("mid", 20), "cu": ("cap", 20)}
+    groups = "".join(
+        f"  {n}: {{within: {body}, plane: {{point: [0, {y}], normal: [0, 1]}}}}\n"
+        for n, (body, y) in planes.items()
+    )
+    text = f"""
+name: between
+mesh:
+  recipe: bricks
+  bricks:
+{lines}plane: strain
+materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
+groups:
+{groups}  base: {{plane: {{point: [0, 0], normal: [0, 1]}}}}
+  press: {{plane: {{point: [0, 30], normal: [0, 1]}}}}
+  grip: {{of: nodes, within: mid, box: {{low: [-1, 14], high: [1, 16]}}}}
+supports:
+  - {{group: base, fix: [x, y]}}
+  - {{group: grip, fix: {{x: 0.25}}, name: pull}}
+loads: [{{group: press, pressure: 2.5, name: press}}]
+steps: [{{press: 1, pull: 0}}, {{press: 1, pull: 1}}]
+contact:
+  - {{name: one, slave: mu, master: lt, friction: 0.2}}
+  - {{name: two, slave: cu, master: mt, friction: 0.6}}
+"""
+    found = solved(text)
+    one, two = found.zones
+    assert (one.friction.status == 2).all()
+    assert (two.friction.status == 1).all()
+    force = found.steps[-1].resultants["one"].force
+    assert abs(force[0]) == pytest.approx(0.2 * 50.0, rel=1e-8)
