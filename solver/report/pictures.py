@@ -7,7 +7,7 @@ anew where a result or the drawing has changed.
 
 import base64
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -58,6 +58,9 @@ def surfaces(solution: Solution, file: str) -> str:
     found = [
         _content(part, zone_fields(solution, part.zone) if part.zone else nodal) for part in drawn
     ]
+    if solution.earlier:
+        for part, (plain, _) in zip(drawn, found, strict=True):
+            plain["earlier"] = [_packed(one) for one in _earlier(solution, part)]
     whole = np.concatenate([part.points[part.used] for part in drawn])
     fields: dict[str, list[np.ndarray]] = {}
     for _, own in reversed(found):
@@ -70,6 +73,7 @@ def surfaces(solution: Solution, file: str) -> str:
         "factor": magnification(solution.displacement, solution.length),
         "whole": [whole.min(axis=0).tolist(), whole.max(axis=0).tolist()],
         "contact": _contact(solution),
+        "steps": [step.factor for step in solution.steps] if solution.earlier else [],
         "maps": [
             {"title": title, "limits": limits, "colors": colors}
             for title, values in fields.items()
@@ -88,6 +92,28 @@ def _contact(solution: Solution) -> list[list[float]] | None:
     pressed = [points[f[zone.multiplier[owner] > 0]].reshape(-1, 3) for zone, f, owner in faces]
     found = np.concatenate([np.empty((0, 3)), *pressed])
     return [found.min(axis=0).tolist(), found.max(axis=0).tolist()] if len(found) else None
+
+
+def _earlier(solution: Solution, part: DrawnPart) -> Iterator[Fields]:
+    """Points and displacement of a part at the positions before the last one, and its pressure."""
+    dim = solution.mesh.points.shape[1]
+    number = next((i for i, zone in enumerate(solution.zones) if zone is part.zone), 0)
+    for position in solution.earlier:
+        points = three(position.points)
+        moved = three(position.at_points["displacement"][:, :dim])
+        if part.zone is None:
+            there = part.used if part.meshed else None
+        else:
+            there = np.concatenate([nodes.ravel() for _, nodes, _ in part.faces])
+        if there is None:  # a surface that the case gives stays where the last step has it
+            yield {}
+            continue
+        found = {"points": points[there], "displacement": moved[there]}
+        if part.zone is not None:
+            pressure = position.pressure(number, len(part.zone.area))
+            each = [np.repeat(owner, nodes.shape[1]) for _, nodes, owner in part.faces]
+            found["pressure"] = pressure[np.concatenate(each)]
+        yield found
 
 
 def _content(part: DrawnPart, fields: Fields) -> tuple[dict[str, Any], Fields]:

@@ -43,6 +43,13 @@
         part.triangles = new Uint32Array(bytes(part.triangles));
         part.edges = new Uint32Array(bytes(part.edges));
         for (const title in part.fields) part.fields[title] = floats(part.fields[title]);
+        // The positions of all steps; the last one has all fields.
+        const pressure = Object.keys(part.fields)[0], { points, displacement, fields } = part;
+        part.places = [...(part.earlier ?? []).map((one) => ({
+          points: one.points ? floats(one.points) : points,
+          displacement: one.displacement ? floats(one.displacement) : displacement,
+          fields: one.pressure ? { [pressure]: floats(one.pressure) } : {},
+        })), { points, displacement, fields }];
       }
       this.map = data.maps[0];
       this.factor = 0;
@@ -77,6 +84,12 @@
         shown.textContent = ` × ${+value.toPrecision(3)}`;
       });
       if (data.parts.some((part) => part.apart.some(Boolean))) slider("apart", 1, this.apart, (value) => { this.apart = value; });
+      if (data.steps?.length) {
+        const label = element(row, "label", {}, "step "), last = data.steps.length;
+        const input = element(label, "input", { type: "range", min: 1, max: last, step: 1, value: last });
+        const shown = element(label, "span", {}, ` ${data.steps[last - 1]}`);
+        input.oninput = () => { shown.textContent = ` ${data.steps[input.value - 1]}`; this.go(input.value - 1); };
+      }
       for (const part of data.parts) {
         const label = element(row, "label"), box = element(label, "input", { type: "checkbox", checked: true });
         element(label, "span", { className: part.role }, ` ${part.name}`);
@@ -118,6 +131,20 @@
       gl.depthFunc(gl.LEQUAL);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    }
+
+    // The bodies where a step has them; maps of the last step alone are empty at others.
+    go(step) {
+      const { gl } = this;
+      for (const part of this.data.parts) {
+        Object.assign(part, part.places[step]);
+        [part.points, part.displacement].forEach((values, i) => {
+          gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]);
+          gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+        });
+      }
+      this.paint();
+      this.draw();
     }
 
     // Colours and values of the map that is chosen.

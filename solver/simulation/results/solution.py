@@ -248,6 +248,13 @@ class Position(NamedTuple):
     at_points: dict[str, np.ndarray]
     of_cells: dict[str, np.ndarray]
 
+    def pressure(self, zone: int, count: int) -> np.ndarray:
+        """The pressure (count,) of the macro-elements of the zone of a number."""
+        mine = self.of_cells["zone"] == zone
+        found = np.zeros(count)
+        found[self.of_cells["macro_element"][mine]] = self.of_cells["pressure"][mine]
+        return found
+
 
 @dataclass
 class Solution:
