@@ -2,6 +2,7 @@
 
 import base64
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +11,16 @@ from solver.case.reader import load_case
 from solver.lac.cells.catalogue import cell_type
 from solver.report.layout import ways_apart
 from solver.report.parts import rigid_surface
-from solver.report.pictures import magnification, split, surfaces
+from solver.report.pictures import magnification, page, split, surfaces
+from solver.simulation.options import LEAN
 from solver.simulation.results.solution import BodyInfo
+from solver.simulation.simulate import solved
+from solver.system.progress import Clock
+from solver.verification.run import mesh_of
 from tests import handmade
+from tests.browser import MISSING, browser
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
 
 
 def read(solution):
@@ -165,3 +173,34 @@ def test_bodies_move_apart_with_their_masters(tmp_path):
     assert ways_apart(solution).tolist() == [[0, 0], [0, 1]]
     solution = handmade.solid(tmp_path)
     assert ways_apart(solution).tolist() == [[0, 0, 0], [0, 0, 1]]
+
+
+def test_all_positions_of_bodies_that_move_far_are_there():
+    """Points of each step, and the pressure there: a slider shows them."""
+    case = load_case(CASES / "motion/slide-c.yaml")
+    solution = solved(case, mesh_of(case), LEAN, Clock())
+    text = surfaces(solution, "c")
+    _, content = json.loads(text.removeprefix("surfaces(...").removesuffix(");\n"))
+    assert content["steps"] == [float(step) for step in range(1, 9)]
+    top = next(part for part in content["parts"] if part["name"] == "top")
+    moved = [np.frombuffer(base64.b64decode(one["points"]), "<f4")[::3] for one in top["earlier"]]
+    assert [float(x.min()) for x in moved] == pytest.approx([5.0 * step for step in range(1, 8)])
+    slave = next(part for part in content["parts"] if not part["body"])
+    for one in slave["earlier"]:
+        pressure = np.frombuffer(base64.b64decode(one["pressure"]), "<f4")
+        assert sorted(set(pressure.round(3).tolist())) == [0.0, 25.0]
+
+
+@pytest.mark.skipif(bool(MISSING), reason=MISSING)
+def test_the_slider_goes_to_a_step(tmp_path):
+    case = load_case(CASES / "motion/slide-c.yaml")
+    solution = solved(case, mesh_of(case), LEAN, Clock())
+    (tmp_path / "c.html").write_text(page(solution, "c"))
+    slider = "[...document.querySelectorAll('input[type=range]')].find(i => i.max == 8)"
+    with browser() as window:
+        window.open(tmp_path / "c.html", width=1300)
+        canvas = "document.querySelector('canvas').toDataURL()"
+        last = window.run(canvas)
+        window.run(f"(() => {{ const s = {slider}; s.value = 2; s.oninput(); return 1; }})()")
+        window.wait(f"{canvas} != {json.dumps(last)}")
+        assert window.run(f"{slider}.parentNode.textContent").split() == ["step", "2"]
