@@ -139,15 +139,18 @@ def shade(share: float, colors: Sequence[str] = PRESSURE) -> str:
 
 
 def mean_normal(solution: Solution) -> np.ndarray:
-    """The mean outward normal of the first zone's slave, (dim,); upward without a zone."""
+    """The outward normal of the first zone's slave where it is pressed, (dim,); else upward."""
     upward = np.eye(solution.mesh.points.shape[1])[-1]
-    return _mean(solution.zones[0].normal, upward) if solution.zones else upward
+    return _mean(solution.zones[0], upward) if solution.zones else upward
 
 
-def _mean(normals: np.ndarray, upward: np.ndarray) -> np.ndarray:
-    mean = normals.mean(axis=0) if len(normals) else upward
+def _mean(zone: ZoneResult, upward: np.ndarray) -> np.ndarray:
+    """The mean normal (dim,) of a slave, weighed by the pressure where there is one."""
+    force = zone.area * np.maximum(zone.multiplier, 0.0)
+    mean = (force if force.any() else zone.area) @ zone.normal
     length = float(np.linalg.norm(mean))
-    return mean / length if length > 1e-6 else upward
+    whole = float(force.sum() if force.any() else zone.area.sum())
+    return mean / length if length > 1e-6 * whole else upward
 
 
 def ways_apart(solution: Solution) -> np.ndarray:
@@ -163,7 +166,7 @@ def ways_apart(solution: Solution) -> np.ndarray:
         if given.master in solution.case.rigid and given.master in names:
             masters = [names.index(given.master)]
         for body in {*masters} - {*slaves} - moved:
-            found[body] = found[slaves[0]] + _mean(zone.normal, np.eye(dim)[-1])
+            found[body] = found[slaves[0]] + _mean(zone, np.eye(dim)[-1])
             moved.add(body)
     return found
 

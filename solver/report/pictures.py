@@ -36,6 +36,8 @@ from .view import AZIMUTH, ELEVATION
 
 # A file of more points is too large for a page.
 MOST_POINTS = 200_000
+# A normal that leans by so much (a sine) is looked at from its side, so far beside it (radians).
+_ASKEW, _BESIDE = 0.5, float(np.radians(30))
 # Maps of errors at nodes: key of the reference, title, sampler of the check.
 _ERRORS = {
     "displacement": ("|Δu| / max |u|", samples.displacement),
@@ -69,7 +71,7 @@ def surfaces(solution: Solution, file: str) -> str:
     content = {
         "dim": dim,
         "length": solution.length,
-        "eye": [float(AZIMUTH), float(np.copysign(ELEVATION, mean_normal(solution)[-1]))],
+        "eye": _eye(mean_normal(solution)),
         "factor": magnification(solution.displacement, solution.length),
         "whole": [whole.min(axis=0).tolist(), whole.max(axis=0).tolist()],
         "contact": _contact(solution),
@@ -83,6 +85,15 @@ def surfaces(solution: Solution, file: str) -> str:
     }
     text = json.dumps([file, content], ensure_ascii=False, separators=(",", ":"))
     return f"surfaces(...{text});\n".replace("<", "\\u003c")
+
+
+def _eye(normal: np.ndarray) -> list[float]:
+    """Where a view is from (angles): the side to which a normal (dim,) of pressed faces points."""
+    level, height = normal[:2], float(normal[-1])
+    azimuth = float(AZIMUTH)
+    if len(normal) == 3 and np.linalg.norm(level) > _ASKEW:
+        azimuth = float(np.arctan2(level[1], level[0])) + _BESIDE
+    return [azimuth, float(np.copysign(ELEVATION, height))]
 
 
 def _contact(solution: Solution) -> list[list[float]] | None:

@@ -9,9 +9,9 @@ import pytest
 
 from solver.case.reader import load_case
 from solver.lac.cells.catalogue import cell_type
-from solver.report.layout import ways_apart
+from solver.report.layout import mean_normal, ways_apart
 from solver.report.parts import rigid_surface
-from solver.report.pictures import magnification, page, split, surfaces
+from solver.report.pictures import _eye, magnification, page, split, surfaces
 from solver.simulation.options import LEAN
 from solver.simulation.results.solution import BodyInfo
 from solver.simulation.simulate import solved
@@ -204,3 +204,22 @@ def test_the_slider_goes_to_a_step(tmp_path):
         window.run(f"(() => {{ const s = {slider}; s.value = 2; s.oninput(); return 1; }})()")
         window.wait(f"{canvas} != {json.dumps(last)}")
         assert window.run(f"{slider}.parentNode.textContent").split() == ["step", "2"]
+
+
+@pytest.mark.parametrize(
+    ("normal", "azimuth"),
+    [([0, 0, 1], -58), ([0.1, 0, 0.99], -58), ([1, 0, 0], 30), ([0, -1, 0], -60)],
+)
+def test_a_view_is_from_the_side_that_is_pressed(normal, azimuth):
+    assert np.degrees(_eye(np.array(normal))[0]) == pytest.approx(azimuth)
+
+
+def test_bodies_move_apart_along_the_normal_where_it_is_pressed(tmp_path):
+    """A pin in a hole has no mean normal; pressed on a side it moves away from that one."""
+    solution = handmade.plane(tmp_path)
+    (zone,) = solution.zones
+    zone.normal = np.array([[1.0, 0.0], [-1.0, 0.0]])
+    zone.multiplier = np.array([0.0, 25.0])
+    assert mean_normal(solution) == pytest.approx([-1.0, 0.0])
+    zone.multiplier = np.zeros(2)
+    assert mean_normal(solution) == pytest.approx([0.0, 1.0])
