@@ -53,8 +53,9 @@ _LARGE = 100_000
 # While the contact status is sought by an iterative solver: residuals of the first solve and of
 # changes, and the share of pressures and motions below which such a solve decides nothing.
 _ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
-# More rows than this make the matrix of the contact alone too large.
-_MOST_ROWS = 4000
+# More rows than these make the matrix of the contact alone too large, or, where each column takes
+# iterations, too long to make: 867 rows of 60,000 unknowns take 65 s, products alone 22 s.
+_MOST_ROWS, _MOST_ITERATIVE = 4000, 400
 # Entries of the solutions that are kept at once for the stiffness that gaps see.
 _AT_ONCE = 1 << 23
 
@@ -354,7 +355,8 @@ class ContactProblem:
         """
         if self._contact_stiffness is None:
             rows = self.constraints.eligible
-            if rows.sum() <= _MOST_ROWS:
+            iterative = self._systems.factored(rows).factor.iterative
+            if rows.sum() <= (_MOST_ITERATIVE if iterative else _MOST_ROWS):
                 found = self.stiffness_of(rows)
                 found = (found + found.T) / 2
                 self._contact_stiffness = found, np.diag(found)
