@@ -11,7 +11,7 @@ from msgspec import structs
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mesh import generate
-from solver.simulation.motion import _joined, solve_moving
+from solver.simulation.motion import _joined
 from solver.simulation.options import LEAN
 from solver.simulation.simulate import simulate, solved
 from solver.system.errors import InputError
@@ -394,9 +394,3 @@ def test_planted_faults_are_noticed(monkeypatch, fault):
     monkeypatch.setattr(place, patch)
     with pytest.raises(AssertionError):
         noticing()
-
-
-def test_only_moving_cases_enter_motion(monkeypatch):
-    monkeypatch.setattr("solver.simulation.motion.solve_moving", None)
-    simulate(moving(motion="small", steps=[{"press": 1, "pull": 0.001}]), generate(MESH, "m"))
-    assert solve_moving is not None
