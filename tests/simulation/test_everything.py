@@ -152,13 +152,14 @@ def test_the_command_line_does_everything(tmp_path, capsys):
 # What a feature is called in the names of functions and of files of its own.
 FEATURES = re.compile(
     r"rigid(?!_motion|Motion)|spring|mixed|initial_strain|StrainTerm|StrainFields|frict|slip(?!_$)|stick"
-    r"|coulomb|cyclic|together|tied|copied|released|probe|stabilis|couple|tangential|quadric",
+    r"|motion\.py|moved\.py|moving|earlier|coulomb|cyclic|together|tied|copied|released|probe|stabilis|couple|tangential|quadric",
     re.IGNORECASE,
 )
 # Questions whether a case has a feature; and how far surfaces slide, which every solve judges.
 GENERAL = {
     "acting.py Load.strains",
     "material.py Material.mixed",
+    "model.py Case.moving",
     "model.py Case.frictional",
     "model.py Case.frictional.<locals>.<genexpr>",
     "validity.py _slip",
