@@ -44,18 +44,25 @@ _STEP: Step = {}
 
 @dataclass(frozen=True)
 class _Place:
-    """A solved step: its groups where the bodies are, the problem there, and its state."""
+    """Where a step left the bodies, and its state."""
 
     groups: Moved
-    problem: ContactProblem
     state: Equilibrium
-    field: Recovered
-    rounds: int
 
     @property
     def displacement(self) -> np.ndarray:
         """The whole displacement (n, dim) from the mesh as given."""
         return self.groups.motion + self.state.displacement
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """A solved step: its place, the problem there, its recovered pressure, and the rounds."""
+
+    place: _Place
+    problem: ContactProblem
+    field: Recovered
+    rounds: int
 
 
 def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> Solution:
@@ -70,26 +77,27 @@ def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) 
     found, ended = list[Solution](), ""
     for factor, step in zip(case.factors, case.steps, strict=True):
         try:
-            place = _placed(model, step, frames, last, clock)
+            solved = _in_place(model, step, frames, last, clock)
         except SolveError as error:
             ended = f"{called(step, factor)}: {error}"
             if not found:
                 raise SolveError(ended) from None
             break
-        tell(called(step, factor), place.state, place.problem.scene.n_multipliers)
+        tell(called(step, factor), solved.place.state, solved.problem.scene.n_multipliers)
         with stage(clock, "recovery"):
-            found.append(_solution(place, factor, found, last))
-        frames, last = place.groups.frames_of_bodies, place
-        rounds = max(rounds, place.rounds)
+            found.append(_solution(solved, factor, found, last))
+        last, rounds = solved.place, max(rounds, solved.rounds)
+        frames = last.groups.frames_of_bodies
+        del solved  # memory for the next factors
     whole = _joined(case.until(len(found)), found)
     why = "pairs and intersections belong to the mesh where the bodies are"
     whole.plan.append(Line(f"bodies followed, up to {rounds} rounds a step", why))
     return finished(whole, clock, ended)
 
 
-def _placed(
+def _in_place(
     model: CutModel, step: Step, frames: Frames, last: _Place | None, clock: Clock
-) -> _Place:
+) -> _Solved:
     """A step solved where its bodies are; SolveError where it has no solution or no place."""
     rest, faces = model.groups, model.contact_faces
     wanted, held = predicted(rest, step, frames)
@@ -97,7 +105,7 @@ def _placed(
     for count in range(1, _ROUNDS + 1):
         groups = Moved(rest, faces, step, frames, wanted)
         try:
-            scene = scene_of(model, groups, clock)
+            scene = scene_of(replace(model, rounding=_rounding(model, groups)), groups, clock)
             if last is None:
                 check_geometry(scene)
             with stage(clock, "assembly"):
@@ -115,9 +123,15 @@ def _placed(
         moves |= (following.shift != frames.shift).any(axis=1)
         _LOG.info("round %d: %d bodies went on", count, moves.sum())
         if not moves.any():
-            return _Place(groups, problem, state, field, count)
+            return _Solved(_Place(groups, state), problem, field, count)
         frames = following
     raise SolveError(f"{body_names(scene)[int(moves.argmax())]} finds no place: it still moves")
+
+
+def _rounding(model: CutModel, groups: Moved) -> float:
+    """How well coordinates are known, those of places far from the mesh as given too."""
+    farthest = float(np.abs(groups.points + groups.origin).max())
+    return max(model.rounding, float(np.finfo(float).eps) * farthest)
 
 
 def _solved(problem: ContactProblem, last: Equilibrium | None) -> tuple[Equilibrium, Recovered]:
@@ -125,14 +139,14 @@ def _solved(problem: ContactProblem, last: Equilibrium | None) -> tuple[Equilibr
     if problem.scene.case.frictional:
         from .equilibrium.friction_recovery import solve_and_recover  # friction alone
 
-        return solve_and_recover(problem, _STEP, from_there(last) if last else None)
+        return solve_and_recover(problem, _STEP, _from_there(last) if last else None)
     state = problem.solve(_STEP)
     if (state.trial.violation(state.iterate.closed) > 1).any():
         raise SolveError("contact bears tension or surfaces overlap")
     return recovered(problem, state, _STEP)
 
 
-def from_there(state: Equilibrium) -> Equilibrium:
+def _from_there(state: Equilibrium) -> Equilibrium:
     """A state from which slips are counted anew, as the step's displacement has those before."""
     assert state.friction is not None
     none = np.zeros_like(state.friction.jump)
@@ -160,12 +174,13 @@ def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames
 
 
 def _solution(
-    place: _Place, factor: float, before: Sequence[Solution], last: _Place | None
+    solved: _Solved, factor: float, before: Sequence[Solution], last: _Place | None
 ) -> Solution:
     """The solution of one step, its motion and what slipped so far included."""
-    problem, state, groups = place.problem, place.state, place.groups
-    plan = [*decided(problem), *plan_notes(problem, [state])]
-    found = solution_of(problem, [state], [place.field], plan)
+    problem, place = solved.problem, solved.place
+    state, groups = place.state, place.groups
+    plan = [*decided(problem), *plan_notes(problem, [state], len(before) + 1)]
+    found = solution_of(problem, [state], [solved.field], plan)
     found.validity = validity(problem, [state])
     found.motion = groups.motion
     (step,) = found.steps

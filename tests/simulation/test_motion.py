@@ -377,7 +377,7 @@ FAULTS = {
     ),
     "springs are drawn from where bodies are": (
         "solver.simulation.scene.moved.Moved.springs",
-        lambda moved: moved.rest.springs(),
+        property(lambda moved: moved.rest.springs),
         test_springs_pull_back_from_where_they_were_made,
     ),
     "slip is counted from the start in each step": (

@@ -86,8 +86,13 @@ def _zone(zone: ZoneScene, scene: Scene, inactive: np.ndarray) -> Iterator[Line]
         yield Line(f"{name}: {held} multipliers left out", why)
 
 
-def plan_notes(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterator[Line]:
-    """The lines of the solve: work that was not needed, and the linear solver."""
+def plan_notes(
+    problem: ContactProblem, states: Sequence[Equilibrium], steps: int = 0
+) -> Iterator[Line]:
+    """The lines of the solve: work that was not needed, and the linear solver.
+
+    `steps`: how many there are on the path so far, where these are more than the `states`.
+    """
     scene = problem.scene
     if scene.zones and len(states) > 1:
         why = "displacements are small: all load factors share them"
@@ -100,13 +105,13 @@ def plan_notes(problem: ContactProblem, states: Sequence[Equilibrium]) -> Iterat
         why = "the same multipliers are closed as at another load factor"
         yield Line("no new factor for each load factor", why, "status")
     if scene.case.frictional:
-        yield from _friction(max(z.zone.friction for z in scene.zones), states)
+        yield from _friction(max(z.zone.friction for z in scene.zones), steps or len(states))
     yield Line(f"linear solver: {problem.linear_solver}", problem.why_solver)
 
 
-def _friction(largest: float, states: Sequence[Equilibrium]) -> Iterator[Line]:
+def _friction(largest: float, steps: int) -> Iterator[Line]:
     """What is certain about a state with friction, and what is not."""
-    path = "one step from rest" if len(states) == 1 else f"a path of {len(states)} steps from rest"
+    path = "one step from rest" if steps == 1 else f"a path of {steps} steps from rest"
     yield Line(f"friction: {path}", "the state depends on the order and the size of the steps")
     from ...mechanics.mortar.coulomb import UNIQUE  # friction alone
 

@@ -112,6 +112,7 @@ class Attributes(CutGroups):
                 values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
         return found
 
+    @cached_property
     def springs(self) -> Springs:
         """The springs to the ground and elastic foundations."""
         from .parts.springs import springs_of
@@ -177,8 +178,13 @@ class Attributes(CutGroups):
         total = sum((holding.force(name) for holding in self.holdings), np.zeros_like(self.points))
         for i, load in enumerate(self.case.loads):
             if name in (None, load.name):
-                total += self.force_of(load, f"loads[{i}].group")
+                total += self._force(load, f"loads[{i}].group")
         return total
+
+    @cached_property
+    def forces_of_loads(self) -> list[np.ndarray]:
+        """Nodal forces (n, dim) of each load at load factor 1, kept: for bodies that move far."""
+        return [self._force(load, f"loads[{i}].group") for i, load in enumerate(self.case.loads)]
 
     def histories(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Forces (n, dim) and displacements (n_dofs,) of each name in `steps`; of no name too."""
@@ -196,8 +202,7 @@ class Attributes(CutGroups):
     def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         return self.forces(name), self.supports(name).offset
 
-    def force_of(self, load: Load, key: str) -> np.ndarray:
-        """Nodal forces (n, dim) of a load under a key, at load factor 1; 0 of those of parts."""
+    def _force(self, load: Load, key: str) -> np.ndarray:
         total = np.zeros_like(self.points)
         if isinstance(load.value, dict):
             return total  # see `initial`

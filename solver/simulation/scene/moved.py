@@ -91,7 +91,7 @@ class Moved(Attributes):
     def forces(self, name: str | None = None) -> np.ndarray:  # noqa: ARG002
         """Nodal forces (n, dim) of the step."""
         total = np.zeros_like(self.points)
-        for load, force in zip(self.case.loads, _forces(self.rest), strict=True):
+        for load, force in zip(self.case.loads, self.rest.forces_of_loads, strict=True):
             turns = load.kind == "pressure"
             moved = self.frames_of_bodies.turned(force, self.body) if turns else force
             total += load.factor(self.step) * moved
@@ -112,9 +112,10 @@ class Moved(Attributes):
         """All that acts in the step, under a name that no step has."""
         return {"": (self.forces(), self.supports().offset)}
 
+    @cached_property
     def springs(self) -> Springs:
         """Those of the mesh as given, drawn by the motion."""
-        stiffness = self.rest.springs().stiffness
+        stiffness = self.rest.springs.stiffness
         assert stiffness is not None
         return Springs(stiffness, self.motion)
 
@@ -143,12 +144,6 @@ def in_step(step: Step, names: tuple[str, ...], of: Callable[[str | None], Any])
     if not isinstance(step, dict):
         return step * of(None)
     return sum(step.get(name, 1.0) * of(name) for name in ("", *names))
-
-
-def _forces(rest: Attributes) -> list[np.ndarray]:
-    """The forces (n, dim) of each load, in the case's order."""
-    loads = enumerate(rest.case.loads)
-    return [rest.force_of(load, f"loads[{i}].group") for i, load in loads]
 
 
 def _imposed(rest: Attributes, step: Step) -> list[tuple[Holding, str, Fixed]]:

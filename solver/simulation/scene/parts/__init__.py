@@ -31,7 +31,7 @@ def parts_of(
     """
     case, parts, strain = groups.case, list[ModelPart](), None
     if any(support.spring for support in case.supports):
-        parts.append(groups.springs())
+        parts.append(groups.springs)
     if any(load.strains for load in case.loads):
         from .strain import StrainFields
 
