@@ -184,6 +184,9 @@ contact:
 
 directions: first                        # or both: also with slave and master exchanged
 steps: [0.5, 1.0]                        # load factors
+# substeps: 10                           # each step in so many equal parts
+motion: small                            # or large: bodies slide, turn and roll far, with small
+                                         # strains, along the path of the steps
 observe:                                 # the contact element nearest to a point, at every step
   - {{zone: interface, nearest: [25.0, 25.0, 0.0]}}
 
