@@ -296,7 +296,8 @@ def _newton_step(
     step = np.einsum("fqij,fqj->fqi", inverse, error)
     # Far outside a bent face the full step may overshoot.
     length = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)
-    return step / np.maximum(length, 1.0)[..., None]
+    with np.errstate(invalid="ignore"):  # a face seen edge-on: no place on it is found
+        return step / np.maximum(length, 1.0)[..., None]
 
 
 def _error(

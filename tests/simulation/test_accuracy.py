@@ -7,17 +7,20 @@ import numpy as np
 import pytest
 
 from solver import solve_case
-from solver.case.reader import load_case
+from solver.case.reader import load_case, parse_case
 from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.stress import largest_strain
 from solver.mesh import generate, transform
+from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.equilibrium.state import Accuracy
+from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
 from solver.studies.digits import exact_state
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
+from solver.verification.run import mesh_of
 from tests.scenes import POISSON, YOUNG, block_mesh, changed_case, with_points
 from tests.studies.measured import STABILITY, point
 
@@ -176,3 +179,28 @@ def test_bodies_that_expand_freely(scale):
     found = solve_case(case)
     assert found.verdict == "solved", found.reason
     assert found.outcome.attainable < 1e-4
+
+
+def test_a_sliver_under_the_end_of_the_master_loosens_no_limit():
+    """A macro-element that is covered by 1e-16 of its area made every tension round-off."""
+    text = """
+name: sliver
+mesh:
+  recipe: punch
+  bottom_size: [50, 10]
+  top_size: [10, 10]
+  bottom: {cells: QUAD4, divisions: [10, 2]}
+  top: {cells: QUAD4, divisions: [3, 2]}
+transform: {shift: {group: top, by: [2.0e-15, 0.0]}}
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.3}}
+supports: [{group: base, fix: [x, y]}, {at: [2.0e-15, 10.0], fix: [x]}]
+loads: [{group: press, pressure: 25.0}]
+contact: [{name: interface, slave: bottom_contact, master: top_contact}]
+"""
+    case = parse_case(text, Path("sliver.yaml"))
+    problem = ContactProblem(build_scene(case, mesh_of(case)))
+    covered = problem.scene.zones[0].operator.covered
+    assert ((covered > 0) & (covered < 1e-12)).any()
+    trial = problem.solve(1.0).trial
+    assert trial.pressure_limit.max() < 1e-9 * trial.pressure.max()

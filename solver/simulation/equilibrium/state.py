@@ -267,8 +267,11 @@ def judged(
         scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
         noise = forces + unbalanced[places].max(initial=0.0)
         for rows in (mine, *zone.slips):
-            error = pressure_of_forces(moving[rows], noise)
-            error += pressure_of_gaps(moving[rows], known[rows], diagonal)
+            # Of what may close: a sliver under the end of the master has no pressure to round.
+            there = constraints.eligible[rows]
+            acting = moving[rows][there]
+            error = pressure_of_forces(acting, noise)
+            error += pressure_of_gaps(acting, known[rows][there], diagonal)
             limit[rows] = _NOISE * scale + _ERRORS * error
     motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
     covered = np.where(constraints.eligible, constraints.covered, np.inf)
