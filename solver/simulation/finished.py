@@ -74,8 +74,9 @@ def _log_forces(solution: Solution) -> None:
             _LOG.log(OUTCOME, "probe %s %s", name, line)
     largest, place = solution.largest_displacement
     at = ", ".join(f"{x:.5g}" for x in place)
-    values = largest, at, solution.validity.strain, solution.strain_energy
-    text = "largest displacement %.6g at (%s), largest strain %.3g, strain energy %.6g"
+    beside = " beside the motion" if solution.motion is not None else ""
+    values = beside, largest, at, solution.validity.strain, solution.strain_energy
+    text = "largest displacement%s %.6g at (%s), largest strain %.3g, strain energy %.6g"
     _LOG.log(OUTCOME, text, *values)
 
 
