@@ -32,6 +32,28 @@ def block_case(dim: int, extra: str = "", zone: str = "", size: float = 1.0) -> 
     return parse_case(text, Path("patch.yaml"))
 
 
+def circle_on_block(divisions: list[int], circle: str, zone: str) -> str:
+    """A rigid circle on a block of 40 × 10 QUAD4, with the keys of the circle and of the zone."""
+    return f"""
+name: circle
+mesh:
+  recipe: bricks
+  bricks:
+    - name: block
+      low: [0.0, 0.0]
+      high: [40.0, 10.0]
+      block: {{cells: QUAD4, divisions: {divisions}}}
+plane: strain
+materials: {{all: {{young: {YOUNG}, poisson: {POISSON}}}}}
+groups:
+  top: {{plane: {{point: [0.0, 10.0], normal: [0.0, 1.0]}}}}
+  base: {{plane: {{point: [0.0, 0.0], normal: [0.0, 1.0]}}}}
+bodies: {{punch: {{sphere: {circle}}}}}
+supports: [{{group: base, fix: [x, y]}}]
+contact: [{{name: interface, slave: top, master: punch, {zone}}}]
+"""
+
+
 def changed_case(dim: int, *changes: tuple[str, str], normal: bool = False, **options) -> Case:
     """`block_case` with parts of its text replaced; `normal`: its supports hold along normals."""
     text = block_case(dim, **options).source

@@ -250,6 +250,8 @@ MOST_STEPS = 1000
 """A case has at most so many steps, those between included."""
 _STEP = "a factor from 0 to 1e30, or a mapping of names to factors"
 _Step = Annotated[_Factor | _Factors, Meta(description=_STEP)]
+_SUBSTEPS = f"a whole number from 1 to {MOST_STEPS}"
+_Substeps = Annotated[int, Meta(ge=1, le=MOST_STEPS, description=_SUBSTEPS)]
 _Steps = Annotated[tuple[_Step, ...], Meta(min_length=1, max_length=MOST_STEPS, description=_STEPS)]
 _Tolerance = Annotated[float, Meta(gt=0, description="a positive number")]
 _TOLERANCE = (
@@ -325,10 +327,8 @@ class CaseFile(Section, frozen=True):
     bodies: dict[Group, Rigid] = field(default_factory=dict)
     contact: tuple[Zone, ...] = ()
     directions: Literal["first", "both"] = "first"
-    steps: Annotated[
-        tuple[_Step, ...], Meta(min_length=1, max_length=MOST_STEPS, description=_STEPS)
-    ] = (1.0,)
-    substeps: Annotated[int, Meta(ge=1, le=1000, description="a whole number from 1 to 1000")] = 1
+    steps: _Steps = (1.0,)
+    substeps: _Substeps = 1
     motion: Literal["small", "large"] = "small"
     observe: tuple[Observation, ...] = ()
     probes: dict[Name, Probe] = field(default_factory=dict)

@@ -121,7 +121,7 @@ def _earlier(solution: Solution, part: DrawnPart) -> Iterator[Fields]:
             continue
         found = {"points": points[there], "displacement": moved[there]}
         if part.zone is not None:
-            pressure = position.pressure(number, len(part.zone.area))
+            pressure = position.of_zone("pressure", number, len(part.zone.area))
             each = [np.repeat(owner, nodes.shape[1]) for _, nodes, owner in part.faces]
             found["pressure"] = pressure[np.concatenate(each)]
         yield found

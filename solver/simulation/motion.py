@@ -20,8 +20,9 @@ from ..lac.errors import SolveError
 from ..system.errors import InputError
 from ..system.progress import Clock, stage
 from .equilibrium.problem import ContactProblem
-from .equilibrium.recovery import Recovered, recovered
+from .equilibrium.recovery import Recovered
 from .equilibrium.state import Equilibrium
+from .equilibrium.step import solve_step
 from .finished import called, finished, tell
 from .judgement.plan import decided, plan_notes
 from .judgement.validity import NOTED_SLIP, validity
@@ -116,7 +117,8 @@ def _in_place(
                 raise
             raise SolveError(f"{error.key}: {error.problem}") from None
         with stage(clock, "solve"):
-            state, field = _solved(problem, last.state if last else None)
+            goes_on = _from_there(last.state) if last and scene.case.frictional else None
+            state, field = solve_step(problem, _STEP, goes_on)
         wanted, _ = predicted(rest, step, settled(groups, state.displacement, held))
         following = _followed(rest, faces, frames, wanted)
         moves = (following.turn != frames.turn).any(axis=(1, 2))
@@ -132,18 +134,6 @@ def _rounding(model: CutModel, groups: Moved) -> float:
     """How well coordinates are known, those of places far from the mesh as given too."""
     farthest = float(np.abs(groups.points + groups.origin).max())
     return max(model.rounding, float(np.finfo(float).eps) * farthest)
-
-
-def _solved(problem: ContactProblem, last: Equilibrium | None) -> tuple[Equilibrium, Recovered]:
-    """The state of a problem, and its recovered pressure."""
-    if problem.scene.case.frictional:
-        from .equilibrium.friction_recovery import solve_and_recover  # friction alone
-
-        return solve_and_recover(problem, _STEP, _from_there(last) if last else None)
-    state = problem.solve(_STEP)
-    if (state.trial.violation(state.iterate.closed) > 1).any():
-        raise SolveError("contact bears tension or surfaces overlap")
-    return recovered(problem, state, _STEP)
 
 
 def _from_there(state: Equilibrium) -> Equilibrium:

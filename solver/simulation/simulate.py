@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import meshio
 
-from ..case.acting import Step
 from ..case.model import Case
 from ..lac.errors import SolveError
 from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .equilibrium.problem import ContactProblem
-from .equilibrium.recovery import Recovered, recovered
+from .equilibrium.recovery import Recovered
 from .equilibrium.state import Equilibrium
+from .equilibrium.step import solve_step
 from .finished import called, finished, tell
 from .judgement.plan import decided, plan_notes
 from .judgement.validity import validity
@@ -69,7 +69,10 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     with stage(clock, "solve"):
         for factor, step in zip(case.factors, case.steps, strict=True):
             try:
-                state, field = _of_step(problem, step, states)
+                last = states[-1] if states else None
+                before = case.steps[len(states) - 1] if states else None
+                start = last.status.closed if last else None
+                state, field = solve_step(problem, step, last, start, before)
             except SolveError as error:
                 ended = f"{called(step, factor)}: {error}" if len(case.steps) > 1 else str(error)
                 if not states:
@@ -84,22 +87,6 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
         solution = solution_of(problem, states, fields, plan)
         solution.validity = validity(problem, states)
     return finished(solution, clock, ended)
-
-
-def _of_step(
-    problem: ContactProblem, step: Step, states: list[Equilibrium]
-) -> tuple[Equilibrium, Recovered]:
-    """A step after those solved, and its recovered pressure."""
-    case, last = problem.scene.case, states[-1] if states else None
-    if case.frictional:
-        from .equilibrium.friction_recovery import solve_and_recover  # friction alone
-
-        return solve_and_recover(problem, step, last)
-    before = case.steps[len(states) - 1] if states else None
-    state = problem.solve(step, last.status.closed if last else None, before=before)
-    if (state.trial.violation(state.iterate.closed) > 1).any():
-        raise SolveError("contact bears tension or surfaces overlap")
-    return recovered(problem, state, step)
 
 
 def assembled(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> ContactProblem:

@@ -129,27 +129,24 @@ def at_positions(quantity: str) -> Sampler:
     """Sample a field of contact at all positions before the last one, where it is covered."""
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
-        numbers = [one.name for one in solution.zones]
+        number = [one.name for one in solution.zones].index(zone.name)
         # Vectors are given on the surface that the case lists as slave.
         sign = -1.0 if solution.swapped and quantity == "friction_traction" else 1.0
         values, places, where = [], [], []
+        count, dim = len(zone.area), solution.mesh.points.shape[1]
         for step, position in enumerate(solution.earlier, start=1):
-            fields = position.of_cells
-            mine = (fields["zone"] == numbers.index(zone.name)) & (
-                fields["coverage"] > MIN_COVERAGE
-            )
-            elements, first = np.unique(fields["macro_element"][mine], return_index=True)
-            dim = solution.mesh.points.shape[1]
-            values.append(sign * fields[quantity][mine][first].reshape(len(first), -1)[:, :dim])
-            places.append(_at_macro(zone, position.points)[elements])
+            covered = position.of_zone("coverage", number, count) > MIN_COVERAGE
+            field = sign * position.of_zone(quantity, number, count).reshape(count, -1)
+            values.append(field[covered, :dim])
+            places.append(_at_macro(zone, position.points)[covered])
+            elements = np.flatnonzero(covered)
             where += [f"macro-element {element} in step {step}" for element in elements]
         if not where:
             return None
         found, centres = np.concatenate(values), np.concatenate(places)
         given = reference if isinstance(reference, tuple) else (reference,)
         expected = np.stack([evaluate(one, centres) for one in given], axis=1)
-        count = len(where)
-        return Sample(found.T.ravel(), expected.T.ravel(), lambda i: where[i % count])
+        return Sample(found.T.ravel(), expected.T.ravel(), lambda i: where[i % len(where)])
 
     return sample
 

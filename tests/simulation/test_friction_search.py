@@ -2,31 +2,17 @@
 
 import pytest
 
-from tests.scenes import solved
+from tests.scenes import circle_on_block, solved
 
 
 @pytest.mark.parametrize("friction", [0.5, 0.1])
 def test_a_free_punch_that_is_pressed_in_finds_its_place(friction):
     """A rigid circle presses a block and is free along it: friction alone holds it, evenly."""
-    text = f"""
-name: pressed
-mesh:
-  recipe: bricks
-  bricks:
-    - name: block
-      low: [0.0, 0.0]
-      high: [40.0, 10.0]
-      block: {{cells: QUAD4, divisions: [40, 10]}}
-plane: strain
-materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
-groups:
-  top: {{plane: {{point: [0.0, 10.0], normal: [0.0, 1.0]}}}}
-  base: {{plane: {{point: [0.0, 0.0], normal: [0.0, 1.0]}}}}
-bodies:
-  punch: {{sphere: {{centre: [10.0, 29.6], radius: 20.0}}, move: {{rz: 0.0}}, force: {{x: 0.0}}}}
-supports: [{{group: base, fix: [x, y]}}]
-contact: [{{name: interface, slave: top, master: punch, friction: {friction}}}]
-"""
+    text = circle_on_block(
+        [40, 10],
+        "{centre: [10.0, 29.6], radius: 20.0}, move: {rz: 0.0}, force: {x: 0.0}",
+        f"friction: {friction}",
+    )
     (zone,) = solved(text).zones
     pressed = zone.multiplier > 0
     assert pressed.sum() > 3

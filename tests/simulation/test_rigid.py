@@ -15,7 +15,7 @@ from solver.mesh.tidy import tidy
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.judge import judge
-from tests.scenes import block_mesh, replaced, solved
+from tests.scenes import block_mesh, circle_on_block, replaced, solved
 
 YOUNG, POISSON = 2000.0, 0.3
 # Two blocks between a plane below and one above: y, or z, from −1 to 1.
@@ -312,22 +312,6 @@ def test_refused_surfaces_of_the_mesh(change, said):
 
 @pytest.mark.parametrize("centre", np.linspace(18.0, 18.5, 11))
 def test_dual_multipliers_where_a_face_sees_a_circle_from_one_point(centre):
-    text = f"""
-name: seen
-mesh:
-  recipe: bricks
-  bricks:
-    - name: block
-      low: [0.0, 0.0]
-      high: [40.0, 10.0]
-      block: {{cells: QUAD4, divisions: [40, 4]}}
-plane: strain
-materials: {{all: {{young: 2000.0, poisson: 0.3}}}}
-groups:
-  top: {{plane: {{point: [0.0, 10.0], normal: [0.0, 1.0]}}}}
-  base: {{plane: {{point: [0.0, 0.0], normal: [0.0, 1.0]}}}}
-bodies: {{punch: {{sphere: {{centre: [{centre}, 14.8], radius: 5.0}}}}}}
-supports: [{{group: base, fix: [x, y]}}]
-contact: [{{name: interface, slave: top, master: punch, treatment: nodal_dual}}]
-"""
+    circle = f"{{centre: [{centre}, 14.8], radius: 5.0}}"
+    text = circle_on_block([40, 4], circle, "treatment: nodal_dual")
     assert solved(text).zones[0].multiplier.max() > 0

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass
 from itertools import islice
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -33,7 +33,7 @@ UNIQUE = 1.0
 """Up to this coefficient the first state found is taken for the only one."""
 # A step of the line search is halved down to this.
 _SHORTEST = 1e-3
-# The share of the way that is tried first, and the smallest.
+# Of a way between forces, the share that is tried first; of any way, the smallest part.
 _FIRST, _SMALLEST = 0.1, 1e-4
 # Where S is a product: the fault that Newton's method ends with, the shares of a fault that GMRES
 # leaves of a large one and at most, its restart and restarts.
@@ -132,36 +132,35 @@ class CoulombContact:
         if stuck is not None:
             yield self._by_friction(stuck, start)
 
+    def _with(self, friction: np.ndarray) -> Self:
+        """The same contact with other coefficients (f,)."""
+        other = copy(self)
+        other.friction = friction
+        return other
+
     def _by_friction(self, z: np.ndarray, start: np.ndarray) -> _Found | None:
         """The law fulfilled by way of larger coefficients, from all sticking at `z` (r,) on."""
-        other, power, step, found = copy(self), np.log(_ROUGH), 1.0, None
-        while power > 0:
-            after = max(power - step, 0.0)
-            other.friction = self.friction * np.exp(after)
-            if (found := other._newton(z, start, False)) is not None:
-                z, power, step = found[1], after, 2 * step
-            elif (step := step / 2) < _SMALLEST:
-                return None
-        return found
+        end = float(np.log(_ROUGH))
+
+        def found_at(gone: float, z: np.ndarray) -> _Found | None:
+            larger = self.friction * np.exp(end - gone)
+            return self._with(larger)._newton(z, start, False)
+
+        return _by_way(z, end, 1.0, found_at)
 
     def _sticking(self, start: np.ndarray) -> np.ndarray | None:
         """The jumps z (r,) where all that is closed sticks, however large its traction."""
-        rough = copy(self)
-        rough.friction = np.full_like(self.friction, _ROUGH)
+        rough = self._with(np.full_like(self.friction, _ROUGH))
         found = rough._newton(np.zeros(len(start)), start, False)
         return None if found is None else found[1]
 
     def _along(self, last: np.ndarray, start: np.ndarray) -> _Found | None:
-        """The law fulfilled on the way from the `last` forces on, in steps as large as succeed."""
-        z, share, step, found = np.zeros(len(start)), 0.0, _FIRST, None
-        while share < 1.0:
-            after = min(share + step, 1.0)
-            found = self._newton(z, (1 - after) * last + after * start, False)
-            if found is not None:
-                z, share, step = found[1], after, 2 * step
-            elif (step := step / 2) < _SMALLEST:
-                return None
-        return found
+        """The law fulfilled by way of forces between the `last` ones and `start` (r,)."""
+
+        def found_at(gone: float, z: np.ndarray) -> _Found | None:
+            return self._newton(z, (1 - gone) * last + gone * start, False)
+
+        return _by_way(np.zeros(len(start)), 1.0, _FIRST, found_at)
 
     def _sliding(self, start: np.ndarray) -> np.ndarray:
         """The jumps z (r,) with all closed and slipping the way that the forces at rest pull."""
@@ -283,3 +282,24 @@ class CoulombContact:
         left = np.clip(_SHARE * np.abs(wanted).max(initial=0.0), _INEXACT, _LARGEST)
         most = {"restart": _RESTART, "maxiter": _RESTARTS}
         return np.asarray(gmres(matrix, wanted, rtol=left, **most)[0] / self.c[rows])
+
+
+def _by_way(
+    z: np.ndarray,
+    end: float,
+    step: float,
+    found_at: Callable[[float, np.ndarray], _Found | None],
+) -> _Found | None:
+    """What is found at the `end` of a way from 0, from `z` (r,) on; None where none leads there.
+
+    `found_at` takes how far it has gone, and the z found before. Its parts, the first one `step`,
+    are as large as succeed.
+    """
+    gone, found = 0.0, None
+    while gone < end:
+        after = min(gone + step, end)
+        if (found := found_at(after, z)) is not None:
+            z, gone, step = found[1], after, 2 * step
+        elif (step := step / 2) < _SMALLEST:
+            return None
+    return found

@@ -21,7 +21,11 @@ _ON_FACES = {
 def grid_of(solution: Solution) -> meshio.Mesh:
     """The volume cells, then the sub-faces of all zones, one block for each cell type."""
     mesh = solution.mesh
-    volumes, faces = _volumes(solution), _face_blocks(solution)[0]
+    volumes = _volumes(solution)
+    faces = [
+        (cell_type(kind).meshio, np.concatenate([part[1] for part in same]))
+        for kind, same in groupby(_face_parts(solution), key=itemgetter(0))
+    ]
     cells = [(mesh.cells[i].type, mesh.cells[i].data) for i in volumes]
     none = [np.empty(0, dtype=int)] * len(faces)
     sets = {name: [of[i] for i in volumes] + none for name, of in mesh.cell_sets.items()}
@@ -31,7 +35,7 @@ def grid_of(solution: Solution) -> meshio.Mesh:
 def grid_fields(solution: Solution) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """The fields at points (n, …) and of cells (n_cells, …); those of contact on faces alone."""
     mesh, dim = solution.mesh, solution.mesh.points.shape[1]
-    cell_data = _face_blocks(solution)[1]
+    cell_data = _on_faces(solution)
     n_volumes = sum(len(mesh.cells[i].data) for i in _volumes(solution))
     for name, values in cell_data.items():
         nothing = np.nan if values.dtype.kind == "f" else -1
@@ -65,21 +69,19 @@ def _recovered_at_nodes(solution: Solution) -> np.ndarray:
     return values
 
 
-def _face_blocks(
-    solution: Solution,
-) -> tuple[list[tuple[str, np.ndarray]], dict[str, np.ndarray]]:
-    """The sub-faces of all zones, a block for each cell type, and the data of these cells."""
+def _face_parts(solution: Solution) -> list[tuple[str, np.ndarray, np.ndarray, int]]:
+    """The sub-faces of all zones by cell type: type, nodes, macro-elements, number of the zone."""
     parts = [
         (kind, connectivity, owner, number)
         for number, zone in enumerate(solution.zones)
         for kind, connectivity, owner in zone.faces
     ]
-    parts.sort(key=itemgetter(0))  # stable: the zones of a block stay in their order
-    blocks = [
-        (cell_type(kind).meshio, np.concatenate([part[1] for part in same]))
-        for kind, same in groupby(parts, key=itemgetter(0))
-    ]
-    none = np.empty(0, dtype=int)
+    return sorted(parts, key=itemgetter(0))  # stable: zones of a type stay in their order
+
+
+def _on_faces(solution: Solution) -> dict[str, np.ndarray]:
+    """The fields of the sub-faces of all zones."""
+    parts, none = _face_parts(solution), np.empty(0, dtype=int)
     data = {
         "macro_element": np.concatenate([none, *(owner for _, _, owner, _ in parts)]),
         "zone": np.concatenate([none, *(np.full(len(o), number) for _, _, o, number in parts)]),
@@ -91,7 +93,7 @@ def _face_blocks(
         for name in ("friction_traction", "slip", "slip_total"):
             values = [_of_friction(solution.zones[n], name)[owner] for _, _, owner, n in parts]
             data[name] = np.concatenate(values)
-    return blocks, data
+    return data
 
 
 def _of_friction(zone: ZoneResult, name: str) -> np.ndarray:

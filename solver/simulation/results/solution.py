@@ -248,11 +248,11 @@ class Position(NamedTuple):
     at_points: dict[str, np.ndarray]
     of_cells: dict[str, np.ndarray]
 
-    def pressure(self, zone: int, count: int) -> np.ndarray:
-        """The pressure (count,) of the macro-elements of the zone of a number."""
-        mine = self.of_cells["zone"] == zone
-        found = np.zeros(count)
-        found[self.of_cells["macro_element"][mine]] = self.of_cells["pressure"][mine]
+    def of_zone(self, field: str, zone: int, count: int) -> np.ndarray:
+        """A field (count, …) of the macro-elements of the zone of a number."""
+        mine, values = np.flatnonzero(self.of_cells["zone"] == zone)[::-1], self.of_cells[field]
+        found = np.zeros((count, *values.shape[1:]))
+        found[self.of_cells["macro_element"][mine]] = values[mine]  # of its first sub-face
         return found
 
 

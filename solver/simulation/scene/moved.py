@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from ...case.acting import Step
 from ...lac.cells.faces import FaceBlock
-from ...mechanics.fem.supports import Fixed
+from ...mechanics.fem.supports import Fixed, FreeMotion
 from ...mechanics.mortar.quadric import Quadric
 from .attributes import Attributes
 from .holdings.holding import Holding
@@ -90,6 +90,10 @@ class Moved(Attributes):
 
     def forces(self, name: str | None = None) -> np.ndarray:  # noqa: ARG002
         """Nodal forces (n, dim) of the step."""
+        return self._all_forces
+
+    @cached_property
+    def _all_forces(self) -> np.ndarray:
         total = np.zeros_like(self.points)
         for load, force in zip(self.case.loads, self.rest.forces_of_loads, strict=True):
             turns = load.kind == "pressure"
@@ -99,6 +103,10 @@ class Moved(Attributes):
 
     def fixed(self, name: str | None = None) -> dict[str, Fixed]:  # noqa: ARG002
         """What is imposed in the step beside the frames."""
+        return self._all_fixed
+
+    @cached_property
+    def _all_fixed(self) -> dict[str, Fixed]:
         found = {}
         for holding, key, fixed in _imposed(self.rest, self.step):
             carried = np.einsum("nd,nd->n", fixed.directions, self.motion[fixed.nodes])
@@ -107,6 +115,14 @@ class Moved(Attributes):
                 left = np.einsum("nd,nd->n", fixed.directions, self._left[fixed.nodes])
             found[key] = replace(fixed, values=left)
         return found
+
+    def supports(self, name: str | None = None) -> FreeMotion:  # noqa: ARG002
+        """The motion that holdings leave free in the step."""
+        return self._all_supports
+
+    @cached_property
+    def _all_supports(self) -> FreeMotion:
+        return super().supports()
 
     def histories(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """All that acts in the step, under a name that no step has."""
