@@ -12,7 +12,7 @@ scikit-fem, and nothing else of this program. Its files in the order of the meth
 - `partners`: the surface that a macro-element meets, and its area
 - `multipliers`, `operator`: the gap operator B, its sums as exact as the area
 - `friction`: the slip of each macro-element
-- `motions`: rigid motions of bodies, and what resists them
+- `motions`: rigid motions of bodies, and what resists them; `roughness`: the surface behind facets
 - `status`: which macro-elements are closed
 - `reconstruction`, `recovery`: a pressure of second order
 

@@ -27,10 +27,10 @@ from .cells.faces import surface_points
 from .errors import SolveError
 from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
-from .motions import smoothed
 from .operator import gap_operator
 from .reconstruction import form_of, vertex_neighbours
 from .recovery import Recovery, RecoveryRequest
+from .roughness import Smooth, smoothed
 from .saddle_point import SaddlePoint, numbered
 from .status import find_status
 
@@ -179,8 +179,9 @@ class LocalAverageContact:
         operator = gap_operator(*self._surfaces)
         self._matrix = operator.matrix
         self._near = vertex_neighbours([(whole.number, self._vertices)], count)
-        about = operator.surface.normal, operator.surface.area, self._near
-        self._smooth = smoothed(operator.matrix, *about) if normal == "element" else self._matrix
+        at, faces_of = operator.surface, [(whole.number, whole.nodes)]
+        about = Smooth(points, faces_of, slaves[0].nodes.ravel(), at.normal, at.area, self._near)
+        self._smooth = smoothed(operator.matrix, about) if normal == "element" else self._matrix
         self._points, self._cells = points, {"slave": self.mesh.dofs.element_dofs.T}
         if not self._whole:
             self._cells["master"] = first + master[0].dofs.element_dofs.T

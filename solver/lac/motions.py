@@ -1,9 +1,8 @@
 """Bodies: connected parts of a mesh, their rigid motions, and what resists these.
 
 Supports resist a motion, and closed contact does that opens or closes under it. The facets of a
-curved surface do so too where the surface itself would not: a pin of tetrahedra in a hole is a
-rough one, and would be held along its axis by its roughness. A motion of which smooth normals,
-means over neighbours, resist only a small share is free.
+curved surface do so too where the surface itself would not. A motion of which only a small share is
+resisted along the normals of the smooth surface (`roughness.py`) is free.
 """
 
 from collections.abc import Iterator
@@ -15,14 +14,8 @@ from scipy.sparse.csgraph import connected_components
 # Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
 # Smooth normals leave at least this share of what resists a motion, or facets alone resist it: of
-# a tapered pin all, of a wave four facets long 1/64, of pins in holes 1/4000 to 1/6000.
+# a tapered pin all, of a wave four facets long 1/64; of pins in holes and balls in sockets 1e-4.
 _SMOOTH = 0.002
-# So often normals are averaged over neighbours.
-_ROUNDS = 3
-# Normals that differ by less are those of a flat surface.
-_BENT = 1e-9
-# Normals of neighbours that differ by less belong to one smooth surface.
-_KINK = np.cos(np.radians(40))
 
 
 def body_numbers(n_nodes: int, cells: dict[str, np.ndarray]) -> np.ndarray:
@@ -122,46 +115,6 @@ def unsupported(
     # Round-off entries would mix the bodies and fill the motions up.
     chosen = np.where(np.abs(vectors[:, free]) > _FREE, vectors[:, free], 0.0)
     return (motions @ sparse.csr_matrix(chosen)).tocsr()
-
-
-def smoothed(
-    gaps: sparse.csr_matrix, normal: np.ndarray, area: np.ndarray, near: sparse.csr_matrix
-) -> sparse.csr_matrix:
-    """Rows of gaps (m, n_dofs) along the means of neighbours' normals, in space; else as they are.
-
-    So are those of a flat surface: the same object comes back.
-
-    `normal` (m, dim), `area` (m,) of macro-elements, `near` (m, m) those that share a vertex.
-
-    Two facets that lean to either side are level on the average:
-
-    >>> lean = np.array([[0.28, 0.0, 0.96], [-0.28, 0.0, 0.96]])
-    >>> rows = sparse.block_diag(list(lean[:, None])).tocsr()
-    >>> near = sparse.csr_matrix(np.ones((2, 2), dtype=bool))
-    >>> smoothed(rows, lean, np.ones(2), near).toarray().round(12).tolist()
-    [[0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]
-    """
-    dim = normal.shape[1]
-    if dim < 3:
-        return gaps
-    i, j = near.nonzero()
-    alike = (normal[i] * normal[j]).sum(axis=1) > _KINK
-    weight = sparse.csr_matrix((area[j[alike]], (i[alike], j[alike])), shape=near.shape)
-    mean = normal
-    for _ in range(_ROUNDS):
-        mean = weight @ mean
-        mean /= np.linalg.norm(mean, axis=1, keepdims=True)
-    if np.abs(mean - normal).max() <= _BENT:
-        return gaps
-    entries = gaps.tocoo()
-    row, node, axis = entries.row, entries.col // dim, entries.col % dim
-    shape = gaps.shape[0], gaps.shape[1] // dim
-    share = sparse.csr_matrix((entries.data * normal[row, axis], (row, node)), shape=shape).tocoo()
-    turned = share.data[:, None] * (mean - normal)[share.row]
-    columns = dim * share.col[:, None] + np.arange(dim)
-    rows = np.broadcast_to(share.row[:, None], columns.shape)
-    places = rows.ravel(), columns.ravel()
-    return (gaps + sparse.csr_matrix((turned.ravel(), places), shape=gaps.shape)).tocsr()
 
 
 def unheld_motion(

@@ -110,16 +110,15 @@ def test_a_receding_contact_starts_from_the_last_status(problem):
     np.testing.assert_array_equal(found, start)
 
 
-def pin(size: float) -> meshio.Mesh:
-    """A pin through the hole of a lug, both of TETRA4."""
+def in_a_hole(hole, inside, size: float) -> meshio.Mesh:
+    """A lug with a hole and what is inside it, of TETRA4; the functions make shapes of gmsh."""
     gmsh.initialize()
     try:
         gmsh.option.setNumber("General.Verbosity", 1)
         shapes = gmsh.model.occ
-        block = shapes.addBox(-25, -25, 0, 50, 65, 5)
-        bore = shapes.addCylinder(0, 0, 0, 0, 0, 5, 10)
+        block, bore = hole(shapes)
         [(_, lug)], _ = shapes.cut([(3, block)], [(3, bore)])
-        shank = shapes.addCylinder(0, 0.05, 0, 0, 0, 5, 9.95)
+        shank = inside(shapes)
         shapes.synchronize()
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         gmsh.model.mesh.generate(3)
@@ -136,21 +135,76 @@ def pin(size: float) -> meshio.Mesh:
     return meshio.Mesh(points, [("tetra", np.concatenate(list(cells.values())))], cell_sets=sets)
 
 
+def pin(size: float) -> meshio.Mesh:
+    """A pin through the hole of a lug."""
+    return in_a_hole(
+        lambda s: (s.addBox(-25, -25, 0, 50, 65, 5), s.addCylinder(0, 0, 0, 0, 0, 5, 10)),
+        lambda s: s.addCylinder(0, 0.05, 0, 0, 0, 5, 9.95),
+        size,
+    )
+
+
+def ball(size: float) -> meshio.Mesh:
+    """A ball in a socket, half of it in the lug."""
+    return in_a_hole(
+        lambda s: (s.addBox(-2, -2, -2, 4, 4, 2), s.addSphere(0, 0, 0, 1)),
+        lambda s: s.addSphere(0, 0, 0, 1),
+        size,
+    )
+
+
+GROUPS = {
+    "top": {"within": "lug", "plane": {"point": [0, 40, 0], "normal": [0, 1, 0]}},
+    "ends": {"within": "pin", "plane": {"point": [0, 0, 0], "normal": [0, 0, 1]}},
+    "hole": {"within": "lug", "where": "1e-3 - abs(sqrt(x * x + y * y) - 10)"},
+    "shank": {
+        "within": "pin",
+        "where": "1e-3 - abs(sqrt(x * x + (y - 0.05) * (y - 0.05)) - 9.95)",
+    },
+}
+AROUND = {
+    "bottom": {"within": "lug", "plane": {"point": [0, 0, -2], "normal": [0, 0, 1]}},
+    "socket": {"within": "lug", "where": "1e-6 - abs(x * x + y * y + z * z - 1)"},
+    "shell": {"within": "pin", "where": "1e-6 - abs(x * x + y * y + z * z - 1)"},
+}
+
+
+@pytest.mark.parametrize("sides", [("socket", "shell"), ("shell", "socket")])
+def test_facets_keep_no_ball_from_turning(sides):
+    """The facets of a sphere lean to all sides; it turns in its socket all the same."""
+    case = {
+        "name": "ball",
+        "materials": {"all": {"young": 70000.0, "poisson": 0.33}},
+        "groups": AROUND,
+        "supports": [{"group": "bottom", "fix": ["x", "y", "z"]}],
+        "loads": [{"group": "pin", "body_force": [0, 0, -100.0]}],
+        "contact": [{"slave": sides[0], "master": sides[1]}],
+    }
+    with pytest.raises(InputError, match=r"nothing keeps pin from a free motion .turn about"):
+        solve_case(case, ball(0.6))
+
+
+def test_facets_keep_no_pin_from_turning():
+    """Nor those of a pin that only its ends hold, along its axis."""
+    case = {
+        "name": "pin",
+        "materials": {"all": {"young": 70000.0, "poisson": 0.33}},
+        "groups": GROUPS,
+        "supports": [{"group": "top", "fix": ["x", "y", "z"]}, {"group": "ends", "fix": ["z"]}],
+        "loads": [{"group": "pin", "body_force": [0, -20.0, 0]}],
+        "contact": [{"slave": "shank", "master": "hole"}],
+    }
+    with pytest.raises(InputError, match=r"nothing keeps pin from a free motion .turn about z"):
+        solve_case(case, pin(5.0))
+
+
 @pytest.mark.parametrize("held", [False, True])
 def test_facets_alone_hold_no_body(held):
     """A hole of TETRA4 is rough: along its axis and around it, a smooth one would not hold."""
     case = {
         "name": "pin",
         "materials": {"all": {"young": 70000.0, "poisson": 0.33}},
-        "groups": {
-            "top": {"within": "lug", "plane": {"point": [0, 40, 0], "normal": [0, 1, 0]}},
-            "ends": {"within": "pin", "plane": {"point": [0, 0, 0], "normal": [0, 0, 1]}},
-            "hole": {"within": "lug", "where": "1e-3 - abs(sqrt(x * x + y * y) - 10)"},
-            "shank": {
-                "within": "pin",
-                "where": "1e-3 - abs(sqrt(x * x + (y - 0.05) * (y - 0.05)) - 9.95)",
-            },
-        },
+        "groups": GROUPS,
         "supports": [{"group": "ends", "fix": ["x", "y", "z"]}],
         "loads": [{"group": "top", "force": [0, 2000.0, 0]}],
         "contact": [{"slave": "hole", "master": "shank"}],

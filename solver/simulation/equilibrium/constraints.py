@@ -12,8 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from ...case.acting import Step
-from ...lac.motions import motion_fields, smoothed, support_resistance, unheld_motion
+from ...lac.motions import motion_fields, support_resistance, unheld_motion
 from ...lac.operator import without_round_off
+from ...lac.roughness import Smooth, smoothed
 from ...mechanics.fem.bodies import nodes_of_unknowns
 from ...mechanics.fem.elasticity import stiffness
 from ...mechanics.linear.choice import against_multigrid
@@ -169,7 +170,10 @@ def _smooth_gaps(scene: Scene) -> sparse.csr_matrix | None:
         rows.append(operator.matrix)
         if zone.zone.normal != "element" or operator.nodes is not None or scene.space < 3:
             continue
-        rows[-1] = smoothed(operator.matrix, surface.normal, surface.area, zone.near)
+        faces = [(b.number, b.nodes) for b in zone.slave_faces]
+        slave = np.unique(np.concatenate([b.nodes.ravel() for b in zone.sub_faces]))
+        about = Smooth(scene.points, faces, slave, surface.normal, surface.area, zone.near)
+        rows[-1] = smoothed(operator.matrix, about)
         bent = bent or rows[-1] is not operator.matrix
     slips = [row for zone in scene.zones for row in zone.operator.slip]
     return sparse.vstack([*rows, *slips]).tocsr() if bent else None

@@ -1,0 +1,161 @@
+"""The smooth surface behind facets: what it resists, and what its facets resist by roughness alone.
+
+A pin of tetrahedra in a hole would be held along its axis and against turning by its roughness, a
+ball in its socket against turning. Planes, spheres, cylinders and cones are quadrics, on which the
+vertices of their facets lie: Q(x) = 0 gives the normals exactly, and a motion that keeps Q opens
+nothing. The normals of other surfaces are means over neighbours.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse.csgraph import connected_components
+
+# So often normals are averaged over neighbours.
+_ROUNDS = 3
+# Normals that differ by less are those of a flat surface.
+_BENT = 1e-9
+# Normals of neighbours that differ by less belong to one smooth surface.
+_KINK = np.cos(np.radians(40))
+# Vertices this near to a quadric, by the size of the surface, lie on it.
+_NEAR = 1e-5
+# A quadric has ten coefficients: it passes through so many vertices by chance.
+_FREEDOM = 10
+
+
+class Smooth(NamedTuple):
+    """Macro-elements of a slave surface in space, and their vertices.
+
+    `points` (n, 3) of all nodes; `faces` as meshed, by block: macro-element (f,) and nodes (f, v);
+    `slave`: nodes of the slave side, also those of the cut; `normal` (m, 3), `area` (m,);
+    `near` (m, m): those that share a vertex.
+    """
+
+    points: np.ndarray
+    faces: list[tuple[np.ndarray, np.ndarray]]
+    slave: np.ndarray
+    normal: np.ndarray
+    area: np.ndarray
+    near: sparse.csr_matrix
+
+
+def smoothed(gaps: sparse.csr_matrix, surface: Smooth) -> sparse.csr_matrix:
+    """Rows of gaps (m, n_dofs) along the normals of the smooth surface.
+
+    Those of a flat surface, and in the plane, stay as they are: the same object comes back.
+
+    Two facets that lean to either side are level on the average:
+
+    >>> points = np.array([[0.0, 0, 0], [0, 1, 0], [24, 0, 7], [24, 1, 7], [48, 0, 0], [48, 1, 0]])
+    >>> faces = [(np.arange(2), np.array([[0, 2, 3, 1], [2, 4, 5, 3]]))]
+    >>> lean = np.array([[-0.28, 0.0, 0.96], [0.28, 0.0, 0.96]])
+    >>> near = sparse.csr_matrix(np.ones((2, 2), dtype=bool))
+    >>> rows = sparse.csr_matrix((2, 18)).tolil()
+    >>> rows[0, :3], rows[1, 12:15] = lean
+    >>> about = Smooth(points, faces, np.arange(6), lean, np.ones(2), near)
+    >>> smooth = smoothed(rows.tocsr(), about).toarray()
+    >>> smooth[0, :3].round(12).tolist(), smooth[1, 12:15].round(12).tolist()
+    ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0])
+    """
+    normal, dim = surface.normal, surface.normal.shape[1]
+    if dim < 3:
+        return gaps
+    i, j = surface.near.nonzero()
+    alike = (normal[i] * normal[j]).sum(axis=1) > _KINK
+    i, j = i[alike], j[alike]
+    weight = sparse.csr_matrix((surface.area[j], (i, j)), shape=surface.near.shape)
+    smooth = normal
+    for _ in range(_ROUNDS):
+        smooth = weight @ smooth
+        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+    if np.abs(smooth - normal).max() <= _BENT:
+        return gaps
+    entries = gaps.tocoo()
+    row, node, axis = entries.row, entries.col // dim, entries.col % dim
+    shape = gaps.shape[0], gaps.shape[1] // dim
+    share = sparse.csr_matrix((entries.data * normal[row, axis], (row, node)), shape=shape)
+    part = connected_components(weight, directed=False)[1]
+    exact = _of_quadrics(smooth, surface, part, share)
+    # Inside a face that is no quadric the normal varies as it does.
+    kept = sparse.diags((~exact).astype(float)) @ gaps
+    share = share.tocoo()
+    turned = share.data[:, None] * (smooth - normal * ~exact[:, None])[share.row]
+    columns = dim * share.col[:, None] + np.arange(dim)
+    rows = np.broadcast_to(share.row[:, None], columns.shape)
+    places = rows.ravel(), columns.ravel()
+    return (kept + sparse.csr_matrix((turned.ravel(), places), shape=gaps.shape)).tocsr()
+
+
+def _of_quadrics(
+    smooth: np.ndarray, surface: Smooth, part: np.ndarray, share: sparse.csr_matrix
+) -> np.ndarray:
+    """Which (m,) belong to a part (m,) that is a quadric, where `smooth` (m, 3) becomes exact.
+
+    It is that of the mean place of what contact covers; `share` (m, n): the weights of nodes in the
+    gaps.
+    """
+    on_slave = np.zeros(len(surface.points))
+    on_slave[surface.slave] = 1.0
+    mine = share @ sparse.diags(on_slave)
+    whole = np.asarray(mine.sum(axis=1)).ravel()
+    place = mine @ surface.points / np.where(whole == 0, 1.0, whole)[:, None]
+    exact = np.zeros(len(smooth), dtype=bool)
+    for number in range(int(part.max()) + 1):
+        nodes = [nodes[part[macro] == number].ravel() for macro, nodes in surface.faces]
+        chosen = (part == number) & (whole != 0)
+        on = surface.points[np.unique(np.concatenate(nodes))]
+        quadric = _quadric(on, place[chosen], surface.normal[chosen])
+        if quadric is not None:
+            normal = quadric(place[chosen])
+            smooth[chosen] = normal * np.sign((normal * smooth[chosen]).sum(axis=1))[:, None]
+            exact |= chosen
+    return exact
+
+
+def _quadric(
+    points: np.ndarray, centre: np.ndarray, normal: np.ndarray
+) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Unit normals at places, of the quadric that all points (n, 3) lie on; None if there is none.
+
+    Two rings of points lie on many. That one is chosen which is least bent, by its slope along the
+    normals of facets (m, 3) at their centres: a cylinder, not two planes.
+    """
+    if len(points) <= _FREEDOM:
+        return None
+    middle = points.mean(axis=0)
+    size = np.abs(points - middle).max()
+    at = (points - middle) / size
+    _, values, rows = np.linalg.svd(_powers(at) / np.sqrt(len(at)))
+    space = rows[values <= _NEAR].T
+    if not space.shape[1]:
+        return None
+    steep = np.einsum("fdk,fd->fk", _slopes((centre - middle) / size), normal) @ space
+    bent = space[:6].T @ space[:6]
+    least = space @ linalg.eigh(-steep.T @ steep, bent)[1][:, 0]
+
+    def normals(places: np.ndarray) -> np.ndarray:
+        slope = _slopes((places - middle) / size) @ least
+        return np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
+
+    return normals
+
+
+def _powers(at: np.ndarray) -> np.ndarray:
+    x, y, z = at.T
+    r = np.sqrt(2.0)  # so that the sum of squares does not depend on the axes
+    return np.column_stack(
+        [x * x, y * y, z * z, r * x * y, r * y * z, r * z * x, at, np.ones(len(at))]
+    )
+
+
+def _slopes(at: np.ndarray) -> np.ndarray:
+    """The gradients (n, 3, 10) of the powers."""
+    found = np.zeros((len(at), 3, 10))
+    axis = np.arange(3)
+    found[:, axis, axis] = 2 * at
+    for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
+        found[:, a, 3 + k], found[:, b, 3 + k] = np.sqrt(2.0) * at[:, b], np.sqrt(2.0) * at[:, a]
+    found[:, axis, 6 + axis] = 1.0
+    return found
