@@ -2,7 +2,7 @@
 
 Supports resist a motion, and closed contact does that opens or closes under it. The facets of a
 curved surface do so too where the surface itself would not. A motion of which only a small share is
-resisted along the normals of the smooth surface (`roughness.py`) is free.
+resisted along the normals of the smooth surface (`lac.roughness`) is free.
 """
 
 from collections.abc import Iterator
