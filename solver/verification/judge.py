@@ -91,7 +91,7 @@ def judge(
     accuracy, scatters = Accuracy(solution.accuracy), unresolved(solution)
     unreliable = [reason for reason in (accuracy.reason, scatters) if reason]
     unreliable += limits_passed(solution.case, solution.validity)
-    reasons = unreliable + [check.reason for check in checks if not check.passed]
+    reasons = unreliable + [_explained(check, accuracy) for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
         word = UNRELIABLE if unreliable else FAILED
@@ -229,6 +229,12 @@ def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:
             given = zip(keys, values, strict=True)
             known = {key: value.tolist() for key, value in given if np.isfinite(value).all()}
             yield Probed(name=name, place=place.tolist(), **known)
+
+
+def _explained(check: CheckResult, accuracy: Accuracy) -> str:
+    """Why a check fails; with what rounding may do, where its error is no larger than that."""
+    lost = check.tolerance < check.error <= accuracy.estimate
+    return f"{check.reason}; {accuracy.words}" if lost else check.reason
 
 
 def _first_of(reasons: Sequence[str]) -> str:

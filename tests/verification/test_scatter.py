@@ -116,6 +116,18 @@ def test_stretched_blocks_are_resolved():
     assert "scatters" not in found.reason
 
 
+def test_what_rounding_takes_from_stretched_blocks_is_said():
+    """Of TRIA3 stretched so, pressures keep all digits, stresses half of them: the reason says it."""
+    case = CASES / "ssnp170" / "g.yaml"
+    mesh = transform(mesh_of(load_case(case)), {"stretch": [1e5, 1]}, "test")
+    found = solve_case(case, mesh)
+    assert found.verdict == "failed"
+    assert "tolerance 1.0e-10; rounding alone may change the result by" in found.reason
+    assert "small faces of slender cells" in found.reason
+    pressures = [check for check in found.checks if check.name == "multiplier"]
+    assert all(check.error < 1e-12 for check in pressures)
+
+
 UPPER, LOWER = (
     (2.0, (13, 12), (20000.0, 1000.0), "upper"),
     (2.0, (13, 12), (20000.0, 1000.0), "lower"),

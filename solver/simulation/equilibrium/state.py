@@ -76,8 +76,11 @@ class Accuracy:
     @property
     def reason(self) -> str:
         """Why the result is unreliable; empty where it is not."""
-        if self.estimate <= 10.0**-LEAST_DIGITS:
-            return ""
+        return self.words if self.estimate > 10.0**-LEAST_DIGITS else ""
+
+    @property
+    def words(self) -> str:
+        """What rounding alone may change, and why."""
         cause = max(self.causes, key=lambda name: self.causes[name])
         share = f"{self.estimate:.0e} of itself" if self.estimate < 1 else "more than itself"
         return f"rounding alone may change the result by {share}: {_REASONS[cause]}"
