@@ -166,8 +166,14 @@ EXCLUDED = (
         "fits by a strain",
     ),
     Rule(
-        {"motion": ("large",), "friction": ("slip back",), "second zone": ("friction",)},
-        "moves by more than a tenth of a face, which is followed",
+        {
+            "treatment": ("nodal",),
+            "slave cells": ("HEXA8",),
+            "form": ("exchanged",),
+            "materials": ("stiff master",),
+            "supports": ("imposed",),
+        },
+        "nodes of a stiff slave outnumber those of a soft master: nearly singular",
     ),
     Rule({"space": _not("space", "solid"), "slave cells": SOLID}, "cells of another dimension"),
     Rule({"space": _not("space", "solid"), "master cells": SOLID}, "cells of another dimension"),
@@ -206,6 +212,14 @@ EXCLUDED = (
     Rule(
         {
             "friction": FRICTION,
+            "gap": ("meshed", "interference", "clearance"),
+            "steps": _not("steps", "one"),
+        },
+        "a gap has no factor",
+    ),
+    Rule(
+        {
+            "second zone": ("friction",),
             "gap": ("meshed", "interference", "clearance"),
             "steps": _not("steps", "one"),
         },

@@ -115,6 +115,11 @@ class States:
         return strain
 
     @property
+    def pressure(self) -> float:
+        """Where bodies are followed, so small that none moves by a tenth of a face."""
+        return 0.4 * PRESSURE if self.row["motion"] == "large" else PRESSURE
+
+    @property
     def shear(self) -> float:
         """The traction of friction along the interface, over the pressure, on the lower body."""
         return {"stick": 0.5 * MU, "slip": MU, "slip back": -MU}.get(self.row["friction"], 0.0)
@@ -173,7 +178,7 @@ class States:
         """`deforms`: a body beside a rigid one on a shaped interface keeps its shape."""
         young, row = YOUNG * stiff * self.unit, self.row
         lame, shear = self._moduli(young, poisson)
-        pressure, size = PRESSURE * self.unit, self.dim + self.axisymmetric
+        pressure, size = self.pressure * self.unit, self.dim + self.axisymmetric
         strain = np.zeros((size, size))
         cells = row["master cells"] if name == "upper" else row["slave cells"]
         if row["also"] in ("strain", "temperature"):

@@ -117,7 +117,7 @@ def test_stretched_blocks_are_resolved():
 
 
 def test_what_rounding_takes_from_stretched_blocks_is_said():
-    """Of TRIA3 stretched so, pressures keep all digits, stresses half of them: the reason says it."""
+    """Pressures of TRIA3 stretched so keep all digits, stresses half of them; it is said."""
     case = CASES / "ssnp170" / "g.yaml"
     mesh = transform(mesh_of(load_case(case)), {"stretch": [1e5, 1]}, "test")
     found = solve_case(case, mesh)
