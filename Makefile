@@ -154,7 +154,7 @@ format: lint-environment ## format the sources
 	@$(ALONE) ruff format .
 	@.venv/bin/snakefmt Snakefile workflow
 
-lint: lint-environment ## check format, style and types of the sources
+lint: lint-environment ## check format, style, types, and packages for known faults (not if OFFLINE=yes)
 	$(ALONE) ruff format --check .
 	$(ALONE) ruff check .
 	.venv/bin/snakefmt --check Snakefile workflow
@@ -163,6 +163,10 @@ lint: lint-environment ## check format, style and types of the sources
 	.venv/bin/reuse lint --quiet
 	.venv/bin/zizmor --quiet --offline --min-severity medium .github
 	.venv/bin/sp-repo-review . > /dev/null
+ifndef OFFLINE
+	@$(ALONE) pip_audit --local --progress-spinner off > .mypy_cache/audit \
+	  || { cat .mypy_cache/audit; exit 1; }
+endif
 
 # A stamp for each lock file: its packages are installed again when it changes, and all of them for
 # another Python.
@@ -217,7 +221,7 @@ endif
 docs: docs-environment ## write the documentation as a site into results/docs
 	@$(ALONE) sphinx --quiet --fresh-env --fail-on-warning --keep-going \
 	  -c docs/site -d .sphinx . results/docs
-	@.venv/bin/python docs/site/links.py results/docs
+	@.venv/bin/python docs/site/loads.py results/docs
 
 BILL = results/bill-of-materials.json
 bill: bill-environment ## write the bill of materials: every installed package and its licence

@@ -3,10 +3,11 @@
 import csv
 import io
 import re
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
+
+from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
 from ..verification.verdict import to_json as strict_json
 from . import formats
@@ -168,50 +169,35 @@ def outcome(rows: Sequence[Row]) -> str:
 
 # The report as JUnit XML, which CI servers read.
 
-_FAILURES, _ERRORS = ("failed", "unreliable"), ("crashed", "refused")
+_FAILURES = ("failed", "unreliable")
 # The parts of the provenance that identify a run.
 _PROPERTIES = ("revision", "cpu", "cores", "platform", "python", "numpy", "scipy", "scikit-fem")
 
 
 def to_junit(rows: Sequence[Row]) -> str:
     """A suite for each family; refused and crashed solves are errors, others not sound failures."""
-    suites = ET.Element("testsuites")
-    for number, (family, members) in enumerate(families(rows).items()):
-        suites.append(_suite(number, family, members))
-    ET.indent(suites)
-    return ET.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"
+    suites = JUnitXml()
+    for family, members in families(rows).items():
+        suites.append(_suite(family, members))
+    return suites.tostring().decode() + "\n"
 
 
-def _suite(number: int, family: str, rows: Sequence[Row]) -> ET.Element:
-    counts = counted(rows)
-    attributes = {
-        "id": str(number),
-        "package": _xml(family),
-        "name": _xml(family),
-        "timestamp": _started(rows),
-        "hostname": "localhost",  # not in a result
-        "tests": str(len(rows)),
-        "failures": str(sum(counts.get(word, 0) for word in _FAILURES)),
-        "errors": str(sum(counts.get(word, 0) for word in _ERRORS)),
-        "time": f"{sum(row.total or 0 for row in rows):.3f}",
-    }
-    suite = ET.Element("testsuite", attributes)
-    properties = ET.SubElement(suite, "properties")
+def _suite(family: str, rows: Sequence[Row]) -> TestSuite:
+    suite = TestSuite(_xml(family))
+    suite.timestamp = _started(rows)
+    suite.hostname = "localhost"  # not in a result
     for name, value in _properties(rows).items():
-        ET.SubElement(properties, "property", {"name": name, "value": _xml(value)})
-    suite.extend(_case(row) for row in rows)
-    ET.SubElement(suite, "system-out")
-    ET.SubElement(suite, "system-err")
+        suite.add_property(name, _xml(value))
+    suite.add_testcases([_case(row) for row in rows])
     return suite
 
 
-def _case(row: Row) -> ET.Element:
-    attributes = {"classname": _xml(row.group), "name": _xml(row.name)}
-    case = ET.Element("testcase", attributes | {"time": f"{row.total or 0:.3f}"})
+def _case(row: Row) -> TestCase:
+    case = TestCase(_xml(row.name), _xml(row.group), round(row.total or 0, 3))
     if not row.sound:
-        tag = "failure" if row.word in _FAILURES else "error"
-        ending = ET.SubElement(case, tag, {"type": row.word, "message": _xml(row.why)})
-        ending.text = _xml(_failed_checks(row))
+        kind = Failure if row.word in _FAILURES else Error
+        case.result = [kind(_xml(row.why), row.word)]
+        case.result[0].text = _xml(_failed_checks(row))
     return case
 
 

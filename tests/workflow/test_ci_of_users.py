@@ -20,7 +20,7 @@ from tests.workflow.projects import ROOT, new_project, summary, write_case
 GITHUB = ROOT / ".github" / "workflows" / "verification.yml"
 ENVIRONMENT = ROOT / ".github" / "actions" / "environment" / "action.yml"
 GITLAB = ROOT / ".gitlab-ci.yml"
-JUNIT = ROOT / "tests" / "report" / "schemas" / "ant-junit.xsd"
+JUNIT = ROOT / "tests" / "report" / "schemas" / "jenkins-junit.xsd"
 
 
 @pytest.mark.parametrize(
