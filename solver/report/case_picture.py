@@ -4,6 +4,7 @@ In 2D the contact is enlarged where it is small; in 3D pressure and deviation ar
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -27,12 +28,12 @@ from .layout import (
     mixed,
     normals,
     outlines,
-    plan_axes,
     pressed_box,
     shade,
 )
 from .parts import DrawnPart, parts, three, zone_fields
 from .symbols import Symbols, body_label, draw_axes
+from .unrolled import laid_flat
 from .view import FLAT, Frame, View, axonometry, draw_labels, lit
 
 # Width and height by the dimension of the bodies; bodies drawn apart by a share of the model.
@@ -165,12 +166,15 @@ def _draw_hatched(
 
 
 def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
-    """A zone seen along its normal: its pressure, and what sticks, or the deviation."""
-    points, (screen, names) = solution.mesh.points, plan_axes(zone)
-    used, flat = np.unique(np.concatenate([f.ravel() for _, f, _ in zone.faces])), points @ screen.T
-    box = pressed_box(flat, [zone], flat[used])
-    names = (with_unit(names[0], solution.case.units.get("length")), names[1])
-    fields = zone_fields(solution, zone)
+    """A zone laid flat: its pressure, and what sticks, or the deviation."""
+    laid, screen = laid_flat(zone), np.eye(3)[:2]
+    flat, fields = laid.plan(solution.mesh.points), zone_fields(solution, zone)
+    used = np.unique(np.concatenate([f.ravel() for _, f, _ in zone.faces]))
+    faces = [(k, f[w], o[w]) for k, f, o in zone.faces for w in [laid.whole(flat[f])]]
+    masters = [(kind, f[laid.whole(flat[f])]) for kind, f in zone.master_faces]
+    zone = replace(zone, faces=faces, master_faces=masters)
+    points, box = np.pad(flat, ((0, 0), (0, 1))), pressed_box(flat, [zone], flat[used])
+    names = (with_unit(laid.names[0], solution.case.units.get("length")), laid.names[1])
     pressure = next(iter(fields))
     second = next((name for name in (STATUS, RELATIVE) if name in fields), pressure)
     for frame, title in zip(_PLANS, dict.fromkeys((pressure, second)), strict=False):

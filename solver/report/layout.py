@@ -198,19 +198,6 @@ def tangent(zone: ZoneResult) -> np.ndarray:
     return along if tuple(np.round(along, 9)) > (0.0, 0.0) else -along
 
 
-def plan_axes(zone: ZoneResult) -> tuple[np.ndarray, tuple[str, str]]:
-    """Two unit vectors (2, 3) in the mean plane, along coordinate axes if it can be; names."""
-    normal = zone.normal.mean(axis=0)
-    drop = int(np.argmax(np.abs(normal))) if np.abs(normal).max() > 1e-6 else 2
-    first, second = (i for i in range(3) if i != drop)
-    normal = normal / max(float(np.linalg.norm(normal)), 1e-300)
-    u = np.eye(3)[first] - normal[first] * normal
-    u /= np.linalg.norm(u)
-    v = np.eye(3)[second] - normal[second] * normal
-    v -= (v @ u) * u
-    return np.stack([u, v / np.linalg.norm(v)]), ("xyz"[first], "xyz"[second])
-
-
 def extents(zone: ZoneResult, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and last position of every macro-element, (m,) each."""
     start, end = np.full(len(zone.centre), np.inf), np.full(len(zone.centre), -np.inf)

@@ -34,7 +34,8 @@ from .charts import (
     series,
     tooltip,
 )
-from .layout import extents, plan_axes, tangent
+from .layout import extents, tangent
+from .unrolled import laid_flat
 
 CONSTANT, MEANS, NODES = "p by macro-element", "means of p by face", "p at nodes"
 RECOVERED, REFERENCE = "p*, recovered", "reference"
@@ -81,7 +82,7 @@ def draw_profile(
     units = solution.case.units
     means = expected(solution, zone)
     where, place = position(solution, zone, along)
-    where = where if along else with_unit(where, units.get("length"))
+    where = where if along or "degrees" in where else with_unit(where, units.get("length"))
     flat = solution.mesh.points.shape[1] == 2 and along is None
     records = _of_elements(zone, place(solution.mesh.points), place, means)
     records += _of_nodes(solution, zone, place, flat)
@@ -284,8 +285,8 @@ def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> 
     if along is not None:
         return mathematics(along.text), along
     if zone.centre.shape[1] == 3:
-        (direction, _), (name, _) = plan_axes(zone)
-        return name, lambda points: points @ direction
+        flat = laid_flat(zone)
+        return flat.profile_name, flat.profile
     normals = zone.normal[zone.multiplier > 0]
     if len(normals) and (normals @ normals.T).min() < _STRAIGHT:
         arc = Arc.of(solution.mesh.points, zone)
