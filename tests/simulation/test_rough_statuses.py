@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import LinearSolver, force_solver
+from solver.mechanics.multigrid import multigrid
 from solver.mesh import generate
 from solver.simulation.equilibrium import problem
 from solver.simulation.equilibrium.problem import ContactProblem

@@ -61,5 +61,5 @@ def test_several_threads_compile_once(monkeypatch):
 
 
 def test_small_cases_import_no_numba():
-    program = "import sys, solver.mechanics.linear.multigrid; sys.exit('numba' in sys.modules)"
+    program = "import sys, solver.mechanics.multigrid.multigrid; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -1,1 +1,1 @@
-"""Linear systems: condensation of the constraints, direct solvers, multigrid."""
+"""Linear systems: condensation of the constraints, the choice of a solver, CHOLMOD."""

@@ -22,8 +22,8 @@ from .krylov import EPSILON
 from .unknowns import Unknowns
 
 if TYPE_CHECKING:
-    from .hierarchy import Hierarchy
-    from .multigrid import Multigrid
+    from ..multigrid.multigrid import Multigrid
+    from ..multigrid.hierarchy import Hierarchy
 
 
 SINGULAR = 4 * EPSILON
@@ -211,7 +211,7 @@ class Shared:
     def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
         """The hierarchy of `matrix`, the same at each call until it is closed."""
         if self._hierarchy is None:
-            from .hierarchy import Hierarchy
+            from ..multigrid.hierarchy import Hierarchy
 
             self._hierarchy = Hierarchy(matrix, unknowns)
         return self._hierarchy
@@ -303,7 +303,7 @@ def prepare(
         against = gave_up or against_multigrid(size, unknowns)
     _LOG.info("linear system of %d unknowns, by %s", size, "a factor" if against else MULTIGRID)
     if unknowns is not None and not against:
-        from .multigrid import Multigrid
+        from ..multigrid.multigrid import Multigrid
 
         why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
         try:

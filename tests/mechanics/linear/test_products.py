@@ -5,7 +5,8 @@ import pytest
 from scipy.sparse import bsr_matrix, eye, kron, random_array
 
 from solver.lac import threads
-from solver.mechanics.linear import galerkin, products
+from solver.mechanics.linear import products
+from solver.mechanics.multigrid import galerkin
 
 
 def on_threads(count, monkeypatch):

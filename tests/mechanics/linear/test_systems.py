@@ -5,10 +5,7 @@ import pytest
 from scipy import sparse
 
 from solver.lac.errors import SolveError
-from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import force_solver
-from solver.mechanics.linear.hierarchy import Interface, Level
-from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.systems import (
     Compliance,
     Part,
@@ -17,7 +14,10 @@ from solver.mechanics.linear.systems import (
     augment,
     stabilise,
 )
-from tests.mechanics.linear.test_hierarchy import pressed
+from solver.mechanics.multigrid import multigrid
+from solver.mechanics.multigrid.hierarchy import Interface, Level
+from solver.mechanics.multigrid.multigrid import Multigrid
+from tests.mechanics.multigrid.test_hierarchy import pressed
 
 COUNT = 30
 

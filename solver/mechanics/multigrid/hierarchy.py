@@ -20,14 +20,14 @@ import numpy as np
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from ...lac.errors import SolveError
+from ..linear.choice import factorise_roughly
+from ..linear.condensed_matrix import CondensedMatrix, Symmetric, in_blocks
+from ..linear.krylov import eigenvalue_bound
+from ..linear.products import InParts, chosen_rows, multiply, pattern, scale_blocks, sums_of_sizes
+from ..linear.symmetric_blocks import NodalMatrix, SymmetricBlocks, halved
+from ..linear.unknowns import LevelNodes, Unknowns, nodes_at, places
 from .aggregation import aggregate, smoothed_along
-from .choice import factorise_roughly
-from .condensed_matrix import CondensedMatrix, Symmetric, in_blocks
 from .galerkin import coarse, smoothed
-from .krylov import eigenvalue_bound
-from .products import InParts, chosen_rows, multiply, pattern, scale_blocks, sums_of_sizes
-from .symmetric_blocks import NodalMatrix, SymmetricBlocks, halved
-from .unknowns import LevelNodes, Unknowns, nodes_at, places
 
 # A share of the diagonal: rows with less, those of pivots, are not smoothed.
 _NOTHING = 1e-4

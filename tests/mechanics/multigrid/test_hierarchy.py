@@ -5,16 +5,16 @@ import pytest
 from scipy.sparse import block_diag, bsr_matrix, csr_matrix, eye, random_array
 from scipy.sparse.linalg import spsolve
 
-from solver.mechanics.linear import multigrid
 from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.hierarchy import Correction, Hierarchy, Level, correction_of
-from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.symmetric_blocks import halved
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
-from tests.mechanics.linear.test_multigrid import block, motions
+from solver.mechanics.multigrid import multigrid
+from solver.mechanics.multigrid.hierarchy import Correction, Hierarchy, Level, correction_of
+from solver.mechanics.multigrid.multigrid import Multigrid
+from tests.mechanics.multigrid.test_multigrid import block, motions
 
 
 def pressed(slave: int, master: int):

@@ -12,14 +12,15 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.errors import SolveError
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
-from solver.mechanics.linear import choice, condensed_matrix, hierarchy, products
+from solver.mechanics.linear import choice, condensed_matrix, products
 from solver.mechanics.linear.choice import Shared, force_solver
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.krylov import ROUGH, two_steps
-from solver.mechanics.linear.multigrid import Multigrid
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
+from solver.mechanics.multigrid import hierarchy
+from solver.mechanics.multigrid.multigrid import Multigrid
 from tests.scenes import grid
 
 

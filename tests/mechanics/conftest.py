@@ -1,7 +1,7 @@
 import pytest
 
 from solver.lac.errors import SolveError
-from solver.mechanics.linear.multigrid import Multigrid
+from solver.mechanics.multigrid.multigrid import Multigrid
 
 
 @pytest.fixture

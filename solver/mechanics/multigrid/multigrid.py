@@ -21,13 +21,13 @@ from scipy.sparse import csr_matrix
 
 from ...lac.errors import SolveError
 from ...lac.threads import prefetch
-from .choice import Shared
-from .condensed_matrix import CondensedMatrix, Symmetric
+from ..linear.choice import Shared
+from ..linear.condensed_matrix import CondensedMatrix, Symmetric
+from ..linear.krylov import EPSILON, conjugate_gradients, in_single, two_steps
+from ..linear.products import multiply, multiply_transposed
+from ..linear.symmetric_blocks import NodalMatrix
+from ..linear.unknowns import Unknowns
 from .hierarchy import Correction, Hierarchy, Level, correction_of, scales_of
-from .krylov import EPSILON, conjugate_gradients, in_single, two_steps
-from .products import multiply, multiply_transposed
-from .symmetric_blocks import NodalMatrix
-from .unknowns import Unknowns
 
 
 class ScaledSystem:

@@ -11,7 +11,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from ...lac.threads import prefetch
 from ...system.compiled import compiled
-from .products import pattern, ranges, share_rows
+from ..linear.products import pattern, ranges, share_rows
 
 _PARTS = 8  # in which threads find a pattern
 _MARKS = 30  # neighbours that an entry of a pattern adds, as multiplications

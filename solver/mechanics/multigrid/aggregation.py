@@ -18,9 +18,9 @@ from scipy.sparse import bsr_matrix, csr_matrix, diags
 
 from ...lac.threads import prefetch
 from ...system.compiled import compiled, part_of_compiled
+from ..linear.products import chosen_rows, ranges, scale_blocks, share_rows
+from ..linear.unknowns import LevelNodes
 from .galerkin import smoothed
-from .products import chosen_rows, ranges, scale_blocks, share_rows
-from .unknowns import LevelNodes
 
 # A share of the diagonal before: less is left where much is dropped.
 _LEAST_DIAGONAL = 0.5

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from solver.mechanics.linear import hierarchy
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
-from solver.mechanics.linear.multigrid import Multigrid, ScaledSystem
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix, halved
-from tests.mechanics.linear.test_hierarchy import condensed, pressed
+from solver.mechanics.multigrid import hierarchy
+from solver.mechanics.multigrid.multigrid import Multigrid, ScaledSystem
 from tests.mechanics.linear.test_symmetric_blocks import symmetric
+from tests.mechanics.multigrid.test_hierarchy import condensed, pressed
 
 PLAIN, DOUBLE, SINGLE, OTHER = "entries", "blocks", "blocks scaled in place", "scaled otherwise"
 
