@@ -24,6 +24,7 @@ from .equilibrium.recovery import Recovered
 from .equilibrium.state import Equilibrium
 from .equilibrium.step import solve_step
 from .finished import called, finished, tell
+from .fit import refuse_unfit
 from .judgement.plan import decided, plan_notes
 from .judgement.validity import NOTED_SLIP, validity
 from .options import Options
@@ -32,7 +33,7 @@ from .results.forces import RigidMotion
 from .results.results import solution_of
 from .results.solution import Line, Position, Solution, Validity
 from .scene.attributes import Attributes
-from .scene.bodies import body_names, check_geometry
+from .scene.bodies import body_names
 from .scene.moved import Frames, Moved, predicted, rotation_vector, settled
 from .scene.scene import CutModel, Scene, build_model, scene_of
 
@@ -108,7 +109,7 @@ def _in_place(
         try:
             scene = scene_of(replace(model, rounding=_rounding(model, groups)), groups, clock)
             if last is None:
-                check_geometry(scene)
+                refuse_unfit(scene)
             with stage(clock, "assembly"):
                 carried = groups.motion - (0.0 if last is None else last.displacement)
                 problem = ContactProblem(scene, carried.ravel() if scene.case.frictional else None)

@@ -13,12 +13,13 @@ from .equilibrium.recovery import Recovered
 from .equilibrium.state import Equilibrium
 from .equilibrium.step import solve_step
 from .finished import called, finished, tell
+from .fit import refuse_unfit
 from .judgement.plan import decided, plan_notes
 from .judgement.validity import validity
 from .options import LEAN, Options
 from .results.results import solution_of
 from .results.solution import Solution
-from .scene.bodies import check_geometry, without_unloaded
+from .scene.bodies import without_unloaded
 from .scene.scene import build_scene
 
 _LOG = logging.getLogger(__name__)
@@ -92,7 +93,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
 def assembled(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> ContactProblem:
     """The contact problem of a case; raises InputError where it does not fit its mesh."""
     scene = build_scene(case, mesh, options, clock)
-    check_geometry(scene)
+    refuse_unfit(scene)
     if options.shortcuts.unloaded:
         with stage(clock, "assembly"):
             scene = without_unloaded(scene)

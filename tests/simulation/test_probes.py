@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from solver.simulation.fit import refusals_on
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
@@ -94,3 +95,13 @@ def test_a_recovered_pressure_is_read_within_its_macro_element():
 def test_what_is_refused(change, message):
     with pytest.raises(InputError, match=message):
         solved(change)
+
+
+def test_all_probes_are_refused_before_the_solve():
+    """`validate --mesh` names each of them."""
+    changes = (("[0.3, -0.7]", "[0.3, -1.7]"), ("[0.51, 0], z", "[0.51, 0.5], z"))
+    case, mesh = changed_case(2, *changes, extra=PROBES), block_mesh("QUAD8", "TRIA6", (3, 2))
+    told = [str(error) for error in refusals_on(case, moved(mesh, 0.04))]
+    assert len(told) == 2
+    assert "probes.inside.at = [0.3, -1.7]: no cell is there" in told[0]
+    assert "probes.middle.at = [0.51, 0.5]: is 0.5 from the slave surface" in told[1]

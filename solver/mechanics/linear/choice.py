@@ -22,8 +22,8 @@ from .krylov import EPSILON
 from .unknowns import Unknowns
 
 if TYPE_CHECKING:
-    from ..multigrid.multigrid import Multigrid
     from ..multigrid.hierarchy import Hierarchy
+    from ..multigrid.multigrid import Multigrid
 
 
 SINGULAR = 4 * EPSILON

@@ -8,17 +8,15 @@ from dataclasses import replace
 import meshio
 import numpy as np
 
-from ...case.acting import Probe
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import surface_nodes, surface_normals
 from ...lac.facets import tangents_of
-from ...mechanics.fem.locate import Located, locate
 from ...mechanics.fem.stress import nodal_stress, normal_stress
-from ...system.errors import InputError
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.recovery import Recovered, RecoveredZone
 from ..equilibrium.state import Equilibrium
 from ..scene.bodies import body_names, meshed_cells
+from ..scene.probing import cells_at, face_at, place_of
 from ..scene.scene import Scene, ZoneScene
 from .balance import (
     imbalances,
@@ -301,68 +299,36 @@ def zone_friction(zone: ZoneScene, state: Equilibrium, field: RecoveredZone | No
     )
 
 
-# A point is in a body, and in two of them, to this share of the model's length; and on a contact
-# surface, which its faces only approximate, to the second.
-_NEAR, _ON_SURFACE = 1e-6, 1e-2
-
-
 def probed(
     scene: Scene, zones: Sequence[ZoneResult], displacement: np.ndarray, stress: np.ndarray
 ) -> dict[str, ProbeResult]:
-    """The values at each probe of the case; InputError where a point is in no body, or in two."""
+    """The values at each probe of the case."""
     found = {}
     for name, probe in scene.case.probes.items():
         if probe.group:
             nodes = scene.probed[name]
             places = scene.points[nodes]
         else:
-            places = np.array([probe.at]) - scene.origin
-        key = f"probes.{name}.{'group' if probe.group else 'at'}"
+            places = place_of(scene, probe)[None]
         if probe.zone:
             zone = next(zone for zone in zones if zone.name == probe.zone)
-            found[name] = _on_surface(scene, zone, places, key, probe.group or list(probe.at or ()))
+            found[name] = _on_surface(scene, zone, places)
             continue
         if probe.group:
             moved, tensor = displacement[nodes], stress[nodes]
         else:
-            cell = _in_body(scene, probe, places[0], key)
+            cell = cells_at(scene, probe)[0]
             moved, tensor = (cell.weights @ f[cell.nodes][None] for f in (displacement, stress))
         none = np.full(len(places), np.nan)
         found[name] = ProbeResult(places + scene.origin, moved, tensor, none)
     return found
 
 
-def _in_body(scene: Scene, probe: Probe, place: np.ndarray, key: str) -> Located:
-    """The cell that holds the point of a probe, at a local place (dim,)."""
-    blocks = list(scene.mesh.cells.items())
-    if probe.within:
-        given = scene.given.groups[probe.within]
-        blocks = [(name, cells[scene.mesh.members(name, given)]) for name, cells in blocks]
-    found, value = locate(scene.points, blocks, place), list(probe.at or ())
-    inside = [one for one in found if one.distance <= _NEAR * scene.length]
-    if not inside:
-        allowed = f"no cell is there; the nearest is {found[0].distance:.3g} away"
-        raise InputError(scene.case.path, key, value, allowed)
-    if len({scene.body[one.nodes[0]] for one in inside}) > 1:
-        allowed = "bodies meet there; name the cells of one of them (within)"
-        raise InputError(scene.case.path, key, value, allowed)
-    return inside[0]
-
-
-def _on_surface(
-    scene: Scene, zone: ZoneResult, places: np.ndarray, key: str, value: object
-) -> ProbeResult:
-    """The contact pressure where the slave surface of a zone is nearest to local places (k, dim).
-
-    `key` of the case file has them as `value`.
-    """
-    blocks = [(name, nodes) for name, nodes, _ in zone.faces]
+def _on_surface(scene: Scene, zone: ZoneResult, places: np.ndarray) -> ProbeResult:
+    """The contact pressure where a zone's slave surface is nearest to local places (k, dim)."""
     pressure = np.empty(len(places))
     for i, place in enumerate(places):
-        face = locate(scene.points, blocks, place)[0]
-        if face.distance > _ON_SURFACE * scene.length:
-            allowed = f"is {face.distance:.3g} from the slave surface of {zone.name}"
-            raise InputError(scene.case.path, key, value, allowed)
+        face = face_at(scene, zone.faces, place)
         owner = zone.faces[face.block][2][face.number]
         at = face.nodes[None], np.array([owner]), face.reference[None]
         pressure[i] = pressure_on(scene.points + scene.origin, zone, face.type.name, *at)[0, 0]

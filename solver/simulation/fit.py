@@ -1,0 +1,137 @@
+"""Whether a case fits its mesh: what makes no sense once bodies and contact are known.
+
+What a case file alone shows is refused in `case.rules`, what a mesh alone shows where it is read. A
+group or a surface that is missing is refused where it is looked up, and a motion that nothing
+resists by the contact problem. All else is here. The first refusal ends a solve; `validate --mesh`
+names all.
+"""
+
+from collections.abc import Iterator
+
+import meshio
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..case.acting import Probe
+from ..case.model import Case
+from ..system.errors import InputError
+from ..system.progress import Clock
+from .equilibrium.problem import ContactProblem
+from .options import LEAN
+from .scene.bodies import ONE_PLACE, bodies_of, body_names, without_unloaded
+from .scene.probing import cells_at, face_at, nearest_cells, place_of
+from .scene.scene import Scene, ZoneScene, build_model, scene_of
+
+# Bodies that overlap by more than this share of the smaller one are no problem of small strain.
+_DEEPEST = 0.1
+# Contact surfaces, which faces only approximate, are where a probe is to this share of the length.
+_ON_SURFACE = 1e-2
+
+
+def refuse_unfit(scene: Scene) -> None:
+    """Raise the first refusal."""
+    for error in refusals(scene):
+        raise error
+
+
+def refusals_on(case: Case, mesh: meshio.Mesh) -> Iterator[InputError]:
+    """All refusals of a case on its mesh, from the first group that is missing on.
+
+    Bodies that move may meet only where the first step brings them.
+    """
+    try:
+        model = build_model(case, mesh, LEAN, Clock())
+        if case.moving:
+            return
+        scene = scene_of(model, model.groups, Clock())
+        found = list(refusals(scene))
+        yield from found
+        if not found:
+            ContactProblem(without_unloaded(scene))
+    except InputError as error:
+        yield error
+
+
+def refusals(scene: Scene) -> Iterator[InputError]:
+    """All refusals of a scene."""
+    for i, zone in enumerate(scene.zones):
+        yield from _groups(scene, i, zone)
+        yield from _deep_overlap(scene, i, zone)
+    yield from _unmerged(scene)
+    for name, probe in scene.case.probes.items():
+        yield from _probe(scene, name, probe)
+
+
+def _groups(scene: Scene, i: int, zone: ZoneScene) -> Iterator[InputError]:
+    """A group on several bodies, one of which is on the other side too, was picked by mistake."""
+    sides = {"slave": zone.slave_faces, "master": zone.master_faces}
+    bodies = {side: bodies_of(scene, faces) for side, faces in sides.items()}
+    common = bodies["slave"] & bodies["master"]
+    for side, other in (("slave", "master"), ("master", "slave")):
+        if common and len(bodies[side]) > 1:
+            names = body_names(scene)
+            held = ", ".join(names[b] for b in sorted(bodies[side]))
+            allowed = (
+                f"has faces on several bodies ({held}), of which {names[min(common)]} carries the "
+                f"{other} too; a surface must be on one body, or on others than its partner"
+            )
+            group = getattr(zone.zone, side)
+            yield InputError(scene.case.path, scene.case.zone_key(i, side), group, allowed)
+
+
+def _deep_overlap(scene: Scene, i: int, zone: ZoneScene) -> Iterator[InputError]:
+    operator = zone.operator
+    covered = np.where(operator.covered > 0, operator.covered, np.inf)
+    depth = -operator.initial / covered
+    used = bodies_of(scene, zone.slave_faces) | bodies_of(scene, zone.master_faces)
+    size = min(float(np.ptp(scene.points[scene.body == b], axis=0).max()) for b in used)
+    deep = depth > _DEEPEST * size
+    if deep.any():
+        worst = int(depth.argmax())
+        allowed = (
+            f"the surfaces overlap by {depth[worst]:.4g} at multiplier {worst} of zone "
+            f"{zone.zone.name} ({int(deep.sum())} beyond the limit); allowed is {_DEEPEST:g} of "
+            f"the smaller body, {_DEEPEST * size:.4g}"
+        )
+        yield InputError(scene.case.path, scene.case.zone_key(i, "slave"), zone.zone.slave, allowed)
+
+
+def _unmerged(scene: Scene) -> Iterator[InputError]:
+    """Nodes of one body at one place without contact between them: an unintended slit."""
+    surfaces = [b.nodes.ravel() for z in scene.zones for b in (*z.slave_faces, *z.master_faces)]
+    surfaces += [f.nodes.ravel() for z in scene.zones for f in z.sub_faces]
+    pairs = cKDTree(scene.points).query_pairs(ONE_PLACE * scene.length, output_type="ndarray")
+    within = scene.body[pairs[:, 0]] == scene.body[pairs[:, 1]]
+    on_surface = np.isin(pairs, np.concatenate([np.empty(0, dtype=int), *surfaces]))
+    loose = pairs[within & ~on_surface.all(axis=1)]
+    if len(loose):
+        name = body_names(scene)[scene.body[loose[0, 0]]]
+        place = ", ".join(f"{x:.6g}" for x in scene.points[loose[0, 0]] + scene.origin)
+        allowed = (
+            f"{len(loose)} pairs of nodes of {name} are at one "
+            f"place and not on a contact surface (the first at ({place})): merge them, or let a "
+            "contact zone join them"
+        )
+        yield InputError(scene.case.path, "mesh", None, allowed)
+
+
+def _probe(scene: Scene, name: str, probe: Probe) -> Iterator[InputError]:
+    """A point outside of what it is asked of, or in two bodies at once."""
+    key = f"probes.{name}.{'group' if probe.group else 'at'}"
+    value, allowed = probe.group or [*(probe.at or ())], ""
+    if probe.zone:
+        zone = next(zone for zone in scene.zones if zone.zone.name == probe.zone)
+        faces = [(block.type.name, block.nodes, block.number) for block in zone.slave_faces]
+        places = scene.points[scene.probed[name]] if probe.group else [place_of(scene, probe)]
+        away = max(face_at(scene, faces, place).distance for place in places)
+        if away > _ON_SURFACE * scene.length:
+            allowed = f"is {away:.3g} from the slave surface of {probe.zone}"
+    elif not probe.group:
+        inside = cells_at(scene, probe)
+        if not inside:
+            nearest = nearest_cells(scene, probe)[0].distance
+            allowed = f"no cell is there; the nearest is {nearest:.3g} away"
+        elif len({scene.body[one.nodes[0]] for one in inside}) > 1:
+            allowed = "bodies meet there; name the cells of one of them (within)"
+    if allowed:
+        yield InputError(scene.case.path, key, value, allowed)
