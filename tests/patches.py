@@ -1,10 +1,16 @@
 """Small contact surfaces face to face, for the tests of gap operators."""
 
+from contextlib import contextmanager
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.cells.shape import shape_functions
 from solver.lac.facets import facets
+from solver.mechanics.linear import choice
+from solver.simulation.equilibrium import constraints
 
 
 def segment_pair(slave_x, master_x, height=0.0):
@@ -46,3 +52,17 @@ def square_pair(slave_type, master_type, seed=0):
         facets(all_points, low, up, np.array([0])),
         facets(all_points, high, down, np.arange(4)),
     )
+
+
+@contextmanager
+def force_solver(kind):
+    """Within the block every system is solved by `cholmod` or `multigrid`; with `auto` as it is."""
+
+    def asked(size, unknowns):
+        return choice_of(size, replace(unknowns, solver=kind))
+
+    choice_of = choice.against_multigrid
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (choice, constraints):
+            patch.setattr(module, "against_multigrid", asked)
+        yield

@@ -127,7 +127,12 @@ def _quadric(
     middle = points.mean(axis=0)
     size = np.abs(points - middle).max()
     at = (points - middle) / size
-    _, values, rows = np.linalg.svd(_powers(at) / np.sqrt(len(at)))
+    powers = _powers(at) / np.sqrt(len(at))
+    _, values, rows = np.linalg.svd(powers[:, 6:])
+    if values[-1] <= _NEAR:  # a plane, which rounded coordinates bend
+        level = rows[-1, :3] / np.linalg.norm(rows[-1, :3])
+        return lambda places: np.tile(level, (len(places), 1))
+    _, values, rows = np.linalg.svd(powers)
     space = rows[values <= _NEAR].T
     if not space.shape[1]:
         return None

@@ -59,10 +59,14 @@ class Safeguards(Switches):
 
 @dataclass(frozen=True)
 class Options:
-    """How a case is solved: by default with all shortcuts and all safeguards."""
+    """How a case is solved: by default with all shortcuts and all safeguards.
+
+    `solver`: what linear systems are solved by, `auto`, `cholmod` or `multigrid`.
+    """
 
     shortcuts: Shortcuts = field(default_factory=Shortcuts)
     safeguards: Safeguards = field(default_factory=Safeguards)
+    solver: str = "auto"
 
     @classmethod
     def everything(cls) -> Self:

@@ -33,7 +33,7 @@ from ..lac.cells.shape import shape_functions
 from ..lac.errors import SolveError
 from ..mechanics.fem.block import Block, CellSum
 from ..mechanics.fem.elasticity import physical_gradients, stiffness
-from ..mechanics.linear.choice import factorise, force_solver
+from ..mechanics.linear.choice import factorise
 from ..simulation.equilibrium.problem import ContactProblem
 from ..simulation.options import Options, Safeguards, Shortcuts
 from ..simulation.results.solution import Solution
@@ -102,14 +102,14 @@ def options_of(run: Run) -> Options:
     return Options(
         Shortcuts.none() if run.everything else Shortcuts(),
         Safeguards() if run.cures else Safeguards.none(),
+        run.solver,
     )
 
 
 def solve(point: Point) -> Record:
     """Errors against the exact solution, and what was solved."""
     mesh = mesh_of(point.case)
-    with force_solver(point.run.solver):
-        solution = simulate(point.case, mesh, options_of(point.run))
+    solution = simulate(point.case, mesh, options_of(point.run))
     return _solved(solution)
 
 
@@ -136,10 +136,9 @@ def timed(point: Point, repetitions: int, started: float) -> Record:
     def run(clock: Clock) -> Solution:
         return simulate(case, mesh, options, clock)
 
-    with force_solver(point.run.solver):
-        solution = run(Clock())
-        process = used_since(started)
-        times = repeated(run, repetitions)
+    solution = run(Clock())
+    process = used_since(started)
+    times = repeated(run, repetitions)
     order = dict.fromkeys(stage for stage in (*SOLVING, *times, TOTAL) if stage in times)
     return _solved(solution) | {
         "process": process,

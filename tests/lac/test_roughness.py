@@ -57,3 +57,12 @@ def at_axis(points):
 )
 def test_other_surfaces_are_no_quadrics(points):
     assert _quadric(points, points[:3], np.eye(3)) is None
+
+
+def test_a_plane_that_rounding_bends_is_one():
+    """Coordinates stored to 1e-8 tilt faces; a plane is on as many quadrics as there are others."""
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.random((30, 2)), 1e-8 * rng.standard_normal(30)])
+    found = _quadric(points @ TURNED.T, points[:3], np.eye(3))(np.zeros((2, 3)))
+    level = TURNED @ [0.0, 0.0, 1.0]
+    assert np.abs(np.abs(found @ level) - 1).max() < 1e-12

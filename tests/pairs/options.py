@@ -175,6 +175,15 @@ EXCLUDED = (
         },
         "nodes of a stiff slave outnumber those of a soft master: nearly singular",
     ),
+    Rule(
+        {
+            "motion": ("large",),
+            "materials": ("stiff master",),
+            "friction": ("slip back",),
+            "second zone": ("friction",),
+        },
+        "friction of a stiff body, by displacements rounded to 5e-8 of it",
+    ),
     Rule({"space": _not("space", "solid"), "slave cells": SOLID}, "cells of another dimension"),
     Rule({"space": _not("space", "solid"), "master cells": SOLID}, "cells of another dimension"),
     Rule({"space": ("solid",), "slave cells": PLANE}, "cells of another dimension"),

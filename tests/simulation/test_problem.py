@@ -9,7 +9,7 @@ import pytest
 from solver.case.reader import parse_case
 from solver.lac.errors import SolveError
 from solver.lac.status import StatusResult
-from solver.mechanics.linear.choice import MULTIGRID, force_solver
+from solver.mechanics.linear.choice import MULTIGRID
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
 from solver.simulation.equilibrium import problem
@@ -17,6 +17,7 @@ from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement.consistency import inconsistency
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
+from tests.patches import force_solver
 from tests.scenes import block_case, block_mesh
 from tests.simulation.test_unloaded import SCENE, side_by_side
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.mechanics.linear.choice import LinearSolver, force_solver
+from solver.mechanics.linear.choice import LinearSolver
 from solver.mechanics.multigrid import multigrid
 from solver.mesh import generate
 from solver.simulation.equilibrium import problem
@@ -16,6 +16,7 @@ from solver.simulation.equilibrium.state import Equilibrium
 from solver.simulation.options import LEAN
 from solver.simulation.scene.scene import Scene, build_scene
 from solver.system.progress import Clock
+from tests.patches import force_solver
 
 SPHERE = Path(__file__).resolve().parents[2] / "cases/hertz/sphere-hexa8.yaml"
 

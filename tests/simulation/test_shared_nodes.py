@@ -7,7 +7,6 @@ import pytest
 
 from solver import solve_case
 from solver.case.reader import parse_case
-from solver.mechanics.linear.choice import force_solver
 from solver.simulation.judgement.validity import meshed
 from solver.simulation.scene.attributes import Attributes
 from solver.simulation.scene.scene import build_scene
@@ -16,6 +15,7 @@ from solver.studies.measures import inf_sup_constant
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
 from tests.faults.planted import CASES
+from tests.patches import force_solver
 from tests.scenes import block_mesh, changed_case, solved
 
 BLOCK = {"cells": "QUAD4", "divisions": [2, 2]}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from solver import solve_case
-from solver.mechanics.linear.choice import force_solver
 from solver.system.errors import InputError
+from tests.patches import force_solver
 from tests.scenes import PRESSURE, block_case, block_mesh
 
 STIFF = {"bottom": ("QUAD4", 16), "top": ("QUAD4", 8), "young": (1e5, 1e3)}

@@ -8,9 +8,7 @@ scaled matrix can be compared with the machine precision.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -19,7 +17,7 @@ from scipy.sparse import csr_matrix, sparray, spmatrix
 from ...lac.errors import SolveError
 from .condensed_matrix import Symmetric
 from .krylov import EPSILON
-from .unknowns import Unknowns
+from .unknowns import AUTO, Unknowns
 
 if TYPE_CHECKING:
     from ..multigrid.hierarchy import Hierarchy
@@ -31,22 +29,6 @@ SINGULAR = 4 * EPSILON
 Solve = Callable[[np.ndarray], np.ndarray]
 # Shares of the diagonal added to a matrix that is singular to working precision: its round-off.
 _SHIFTS = 1e-15, 1e-14
-_auto: ContextVar[str] = ContextVar("auto", default="auto")
-
-
-@contextmanager
-def force_solver(kind: str) -> Iterator[None]:
-    """Within the block `auto` means `kind`: `cholmod` or `multigrid`."""
-    token = _auto.set(kind)
-    try:
-        yield
-    finally:
-        _auto.reset(token)
-
-
-def wanted() -> str:
-    """The present meaning of `auto`: `auto`, `cholmod` or `multigrid`."""
-    return _auto.get()
 
 
 class Factor:
@@ -308,7 +290,7 @@ def prepare(
         why = f"{MULTIGRID_FROM} unknowns or more in 3D: faster and smaller than a factor"
         try:
             solver = Multigrid(matrix, unknowns, shared)
-            return LinearSolver(matrix, solver, why if wanted() == "auto" else _ASKED)
+            return LinearSolver(matrix, solver, why if unknowns.solver == AUTO else _ASKED)
         except SolveError as error:
             # A factor decides whether the matrix is to blame.
             against = gave_up = _fallback_reason(error)
@@ -318,8 +300,8 @@ def prepare(
 
 def against_multigrid(size: int, unknowns: Unknowns) -> str:
     """Why a system of that size is factored; empty where it is not."""
-    if wanted() != "auto":
-        return "" if wanted() == MULTIGRID else _ASKED
+    if unknowns.solver != AUTO:
+        return "" if unknowns.solver == MULTIGRID else _ASKED
     if unknowns.dim == 2:
         return "a factor is small in 2D"
     if unknowns.factored:

@@ -19,6 +19,10 @@ from ..fem.block import Block
 _ROWS = 1 << 15  # that a thread handles at once
 
 
+AUTO = "auto"
+"""The solver is chosen by the size of a system."""
+
+
 @dataclass(frozen=True)
 class Unknowns:
     """The meaning of the unknowns of a system, in `dim` dimensions.
@@ -27,7 +31,8 @@ class Unknowns:
     motions (n, 3 or 6) in these unknowns, which nobody keeps; `body` (n,): the number of the body.
     Bodies that slide on each other share no aggregate. `points` (n_nodes, 3): coordinates of the
     nodes. Where cells are quadratic, `linear` (n, m) interpolates from the unknowns `vertices` (m,)
-    of linear cells. `factored`: why multigrid does not serve, if anything says so.
+    of linear cells. `factored`: why multigrid does not serve, if anything says so. `solver`: what
+    the system is solved by, `auto`, `cholmod` or `multigrid`.
     """
 
     dim: int
@@ -38,6 +43,7 @@ class Unknowns:
     vertices: np.ndarray | None = None
     linear: csr_matrix | None = None
     factored: str = ""
+    solver: str = AUTO
 
     @property
     def quadratic(self) -> bool:
@@ -52,10 +58,11 @@ class Unknowns:
 
         arrays = self.node[chosen], motions, self.body[chosen], self.points
         if self.linear is None or self.vertices is None:
-            return Unknowns(self.dim, *arrays, factored=self.factored)
+            return Unknowns(self.dim, *arrays, factored=self.factored, solver=self.solver)
         mine = np.flatnonzero(np.isin(self.vertices, chosen))
         vertices = np.searchsorted(chosen, self.vertices[mine])
-        return Unknowns(self.dim, *arrays, vertices, self.linear[chosen][:, mine], self.factored)
+        about = vertices, self.linear[chosen][:, mine], self.factored, self.solver
+        return Unknowns(self.dim, *arrays, *about)
 
     def of_vertices(self) -> "Unknowns":
         """Those of linear cells on the same vertices."""

@@ -369,6 +369,7 @@ def free_unknowns(scene: Scene) -> Unknowns:
     factored = next((part.factored for part in scene.parts if part.factored), "")
     about = dim, node, motions, scene.body[node], scene.points
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
-        return Unknowns(*about, factored=factored)
+        return Unknowns(*about, factored=factored, solver=scene.options.solver)
     vertices = from_vertices(scene.points, scene.blocks)
-    return Unknowns(*about, *linear_unknowns(basis, dim, *vertices), factored)
+    linear = linear_unknowns(basis, dim, *vertices)
+    return Unknowns(*about, *linear, factored, scene.options.solver)

@@ -5,7 +5,6 @@ import pytest
 from scipy import sparse
 
 from solver.lac.errors import SolveError
-from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.systems import (
     Compliance,
     Part,
@@ -18,6 +17,7 @@ from solver.mechanics.multigrid import multigrid
 from solver.mechanics.multigrid.hierarchy import Interface, Level
 from solver.mechanics.multigrid.multigrid import Multigrid
 from tests.mechanics.multigrid.test_hierarchy import pressed
+from tests.patches import force_solver
 
 COUNT = 30
 

@@ -11,12 +11,12 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
 from solver.mechanics.linear import products, unknowns
-from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.unknowns import LevelNodes
 from solver.mechanics.multigrid import aggregation, multigrid
 from solver.mechanics.multigrid.aggregation import Near, _graph, filtered, smoothed_along
 from solver.mechanics.multigrid.multigrid import Multigrid
 from tests.mechanics.multigrid.test_multigrid import held, motions
+from tests.patches import force_solver
 from tests.scenes import grid, replaced, solved
 
 

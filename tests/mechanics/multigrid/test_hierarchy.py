@@ -5,7 +5,6 @@ import pytest
 from scipy.sparse import block_diag, bsr_matrix, csr_matrix, eye, random_array
 from scipy.sparse.linalg import spsolve
 
-from solver.mechanics.linear.choice import force_solver
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.symmetric_blocks import halved
@@ -15,6 +14,7 @@ from solver.mechanics.multigrid import multigrid
 from solver.mechanics.multigrid.hierarchy import Correction, Hierarchy, Level, correction_of
 from solver.mechanics.multigrid.multigrid import Multigrid
 from tests.mechanics.multigrid.test_multigrid import block, motions
+from tests.patches import force_solver
 
 
 def pressed(slave: int, master: int):

@@ -13,7 +13,7 @@ from solver.lac.errors import SolveError
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
 from solver.mechanics.linear import choice, condensed_matrix, products
-from solver.mechanics.linear.choice import Shared, force_solver
+from solver.mechanics.linear.choice import Shared
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.krylov import ROUGH, two_steps
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix
@@ -21,6 +21,7 @@ from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
 from solver.mechanics.multigrid import hierarchy
 from solver.mechanics.multigrid.multigrid import Multigrid
+from tests.patches import force_solver
 from tests.scenes import grid
 
 
@@ -279,8 +280,7 @@ def test_nodal_blocks_give_the_solution_of_the_entries(tied):
 def test_choice_as_asked_for():
     matrix, unknowns = clamped(6)
     for kind, name in (("multigrid", "multigrid"), ("cholmod", "CHOLMOD")):
-        with force_solver(kind):
-            chosen = choice.prepare(matrix, unknowns)
+        chosen = choice.prepare(matrix, replace(unknowns, solver=kind))
         assert name in chosen.name
         assert chosen.why == "as asked for"
 
