@@ -128,11 +128,11 @@ def _quadric(
     size = np.abs(points - middle).max()
     at = (points - middle) / size
     powers = _powers(at) / np.sqrt(len(at))
-    _, values, rows = np.linalg.svd(powers[:, 6:])
+    _, values, rows = np.linalg.svd(powers[:, 6:], full_matrices=False)
     if values[-1] <= _NEAR:  # a plane, which rounded coordinates bend
         level = rows[-1, :3] / np.linalg.norm(rows[-1, :3])
         return lambda places: np.tile(level, (len(places), 1))
-    _, values, rows = np.linalg.svd(powers)
+    _, values, rows = np.linalg.svd(powers, full_matrices=False)
     space = rows[values <= _NEAR].T
     if not space.shape[1]:
         return None

@@ -46,7 +46,7 @@ def laid_flat(zone: ZoneResult) -> LaidFlat:
     size = float(np.linalg.norm(mean))
     if size > 0 and (normal @ mean).min() > _FLAT * size:
         return _seen_along(zone.normal.mean(axis=0))
-    _, sizes, axes = np.linalg.svd(normal)
+    _, sizes, axes = np.linalg.svd(normal, full_matrices=False)
     if sizes[2] <= _ROUND * sizes[0]:
         return _unrolled(axes[2], normal, centre) or _seen_along(zone.normal.mean(axis=0))
     return _from_pole(normal, centre) or _seen_along(zone.normal.mean(axis=0))
