@@ -76,12 +76,16 @@ def smoothed(gaps: sparse.csr_matrix, surface: Smooth) -> sparse.csr_matrix:
     row, node, axis = entries.row, entries.col // dim, entries.col % dim
     shape = gaps.shape[0], gaps.shape[1] // dim
     share = sparse.csr_matrix((entries.data * normal[row, axis], (row, node)), shape=shape)
+    on_slave = np.zeros(gaps.shape[1] // dim, dtype=bool)
+    on_slave[surface.slave] = True
+    sides = np.stack([smooth, smooth])
     part = connected_components(weight, directed=False)[1]
-    exact = _of_quadrics(smooth, surface, part, share)
+    exact = _of_quadrics(sides, surface, part, share, on_slave)
     # Inside a face that is no quadric the normal varies as it does.
     kept = sparse.diags((~exact).astype(float)) @ gaps
     share = share.tocoo()
-    turned = share.data[:, None] * (smooth - normal * ~exact[:, None])[share.row]
+    along = sides[on_slave[share.col].astype(int), share.row]
+    turned = share.data[:, None] * (along - (normal * ~exact[:, None])[share.row])
     columns = dim * share.col[:, None] + np.arange(dim)
     rows = np.broadcast_to(share.row[:, None], columns.shape)
     places = rows.ravel(), columns.ravel()
@@ -89,27 +93,34 @@ def smoothed(gaps: sparse.csr_matrix, surface: Smooth) -> sparse.csr_matrix:
 
 
 def _of_quadrics(
-    smooth: np.ndarray, surface: Smooth, part: np.ndarray, share: sparse.csr_matrix
+    sides: np.ndarray,
+    surface: Smooth,
+    part: np.ndarray,
+    share: sparse.csr_matrix,
+    on_slave: np.ndarray,
 ) -> np.ndarray:
-    """Which (m,) belong to a part (m,) that is a quadric, where `smooth` (m, 3) becomes exact.
+    """Which (m,) belong to a part (m,) that is a quadric; there `sides` (2, m, 3) become exact.
 
-    It is that of the mean place of what contact covers; `share` (m, n): the weights of nodes in the
-    gaps.
+    They are the normals for the motion of the master and of the slave, at the mean places of what
+    meets; `share` (m, n): the weights of nodes in the gaps, those of the slave by `on_slave` (n,).
     """
-    on_slave = np.zeros(len(surface.points))
-    on_slave[surface.slave] = 1.0
-    mine = share @ sparse.diags(on_slave)
-    whole = np.asarray(mine.sum(axis=1)).ravel()
-    place = mine @ surface.points / np.where(whole == 0, 1.0, whole)[:, None]
-    exact = np.zeros(len(smooth), dtype=bool)
+    place = np.zeros_like(sides)
+    for mine, found in ((on_slave, place[1]), (~on_slave, place[0])):
+        weights = share @ sparse.diags(mine.astype(float))
+        whole = np.asarray(weights.sum(axis=1)).ravel()[:, None]
+        # A master without nodes is where the slave is.
+        found[:] = np.divide(weights @ surface.points, whole, out=place[1].copy(), where=whole != 0)
+    seen = np.diff(share.indptr) > 0
+    exact = np.zeros(len(part), dtype=bool)
     for number in range(int(part.max()) + 1):
         nodes = [nodes[part[macro] == number].ravel() for macro, nodes in surface.faces]
-        chosen = (part == number) & (whole != 0)
+        chosen = (part == number) & seen
         on = surface.points[np.unique(np.concatenate(nodes))]
-        quadric = _quadric(on, place[chosen], surface.normal[chosen])
+        quadric = _quadric(on, place[1, chosen], surface.normal[chosen])
         if quadric is not None:
-            normal = quadric(place[chosen])
-            smooth[chosen] = normal * np.sign((normal * smooth[chosen]).sum(axis=1))[:, None]
+            for side, places in zip(sides, place, strict=True):
+                normal = quadric(places[chosen])
+                side[chosen] = normal * np.sign((normal * side[chosen]).sum(axis=1))[:, None]
             exact |= chosen
     return exact
 
