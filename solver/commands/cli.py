@@ -105,10 +105,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # An unsound result is refused in one line: earlier warnings of libraries add nothing.
         if not sys.warnoptions:
             warnings.simplefilter("ignore")
-    options = _parse(sys.argv[1:] if arguments is None else arguments)
-    if options.threads:
-        limit_threads(options.threads)
+    options = argparse.Namespace()
     try:
+        options = _parse(sys.argv[1:] if arguments is None else arguments)
+        if options.threads:
+            limit_threads(options.threads)
         return options.run(options)
     except InputError as error:
         print(error, file=sys.stderr)

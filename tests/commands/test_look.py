@@ -1,6 +1,8 @@
 """The commands that look at cases, meshes and results."""
 
 import re
+import subprocess
+import sys
 
 import meshio
 import numpy as np
@@ -118,3 +120,12 @@ def test_help_lists_what_people_use_in_the_order_of_use(capsys):
     shown = re.findall(r"^ {4}([a-z-]+)", capsys.readouterr().out, re.MULTILINE)
     assert shown[:4] == ["new", "validate", "mesh", "solve"]
     assert not {"serve", "crashed", "study"} & set(shown)
+
+
+@pytest.mark.parametrize("words", [["--version", "--verbose"], ["list"]])
+def test_a_reader_that_leaves_is_no_error(words):
+    """As `head` does: no traceback."""
+    command = [sys.executable, "-m", "solver", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        run.stdout.close()
+        assert run.stderr.read() == b""
