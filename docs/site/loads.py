@@ -24,4 +24,4 @@ def loaded(folder: Path) -> list[str]:
 
 if __name__ == "__main__":
     FOUND = loaded(Path(sys.argv[1]))
-    sys.exit("\n".join(FOUND))
+    sys.exit("\n".join(FOUND) or 0)
