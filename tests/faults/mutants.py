@@ -141,7 +141,7 @@ MUTANTS = (
            "simulation.scene.holdings.cyclic:copies_of", changed(
                lambda found: {k: replace(c, turn=c.turn.T) for k, c in found.items()})),
     Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
-           "simulation.results.results:locate", changed(
+           "simulation.scene.probing:locate", changed(
                lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
     Mutant("traction-lost", "the exact solution's traction does not act", CYLINDER,
            "simulation.scene.attributes:Attributes._exact_force", changed(np.zeros_like)),
