@@ -148,7 +148,8 @@ def _quadric(
     if not space.shape[1]:
         return None
     steep = np.einsum("fdk,fd->fk", _slopes((centre - middle) / size), normal) @ space
-    bent = space[:6].T @ space[:6]
+    # Positive, where a surface is so shallow that its quadric is nearly a plane.
+    bent = space[:6].T @ space[:6] + _NEAR**2 * np.eye(space.shape[1])
     least = space @ linalg.eigh(-steep.T @ steep, bent)[1][:, 0]
 
     def normals(places: np.ndarray) -> np.ndarray:
