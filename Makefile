@@ -163,10 +163,11 @@ lint: lint-environment ## check format, style, types, and packages for known fau
 	.venv/bin/reuse lint --quiet
 	.venv/bin/zizmor --quiet --offline --min-severity medium .github
 	.venv/bin/sp-repo-review . > /dev/null
-	@rm -f .mypy_cache/audit; $(ALONE) pip_audit --local --progress-spinner off \
-	  --output .mypy_cache/audit > .mypy_cache/audit.log 2>&1 || { ! test -s .mypy_cache/audit \
-	  || { cat .mypy_cache/audit; exit 1; }; \
-	  echo "packages not audited: $$(tail -n 1 .mypy_cache/audit.log | cut -c 1-99)"; }
+	@rm -f .mypy_cache/audit
+	@if $(ALONE) pip_audit --local --progress-spinner off --output .mypy_cache/audit \
+	  > .mypy_cache/audit.log 2>&1; then :; \
+	elif test -s .mypy_cache/audit; then cat .mypy_cache/audit; exit 1; \
+	else echo "packages not audited: $$(tail -n 1 .mypy_cache/audit.log | cut -c 1-99)"; fi
 
 # A stamp for each lock file: its packages are installed again when it changes, and all of them for
 # another Python.

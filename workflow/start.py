@@ -1,7 +1,7 @@
 """Start Snakemake; an interrupt while it is not yet at work ends the run without a traceback.
 
 Snakemake limits how many jobs start in a second, and wakes its scheduler once a second for each job
-that has started so far. On one machine nothing needs this limit: there is none.
+that has started so far. Jobs that run on this machine need no such limit, so it is removed.
 """
 
 import sys

@@ -128,7 +128,7 @@ def _of_quadrics(
 def _quadric(
     points: np.ndarray, centre: np.ndarray, normal: np.ndarray
 ) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Unit normals at places, of the quadric that all points (n, 3) lie on; None if there is none.
+    """A function that gives unit normals of the quadric through all points (n, 3), or None.
 
     Two rings of points lie on many. That one is chosen which is least bent, by its slope along the
     normals of facets (m, 3) at their centres: a cylinder, not two planes.

@@ -173,7 +173,7 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
     faces = [(k, f[w], o[w]) for k, f, o in zone.faces for w in [laid.whole(flat[f])]]
     masters = [(kind, f[laid.whole(flat[f])]) for kind, f in zone.master_faces]
     zone = replace(zone, faces=faces, master_faces=masters)
-    points, box = np.pad(flat, ((0, 0), (0, 1))), pressed_box(flat, [zone], flat[used])
+    points, box = three(flat), pressed_box(flat, [zone], flat[used])
     names = (with_unit(laid.names[0], solution.case.units.get("length")), laid.names[1])
     pressure = next(iter(fields))
     second = next((name for name in (STATUS, RELATIVE) if name in fields), pressure)

@@ -46,10 +46,13 @@ def laid_flat(zone: ZoneResult) -> LaidFlat:
     size = float(np.linalg.norm(mean))
     if size > 0 and (normal @ mean).min() > _FLAT * size:
         return _seen_along(zone.normal.mean(axis=0))
+    middle = _middle(normal, centre)
+    if middle is None:
+        return _seen_along(zone.normal.mean(axis=0))
     _, sizes, axes = np.linalg.svd(normal, full_matrices=False)
     if sizes[2] <= _ROUND * sizes[0]:
-        return _unrolled(axes[2], normal, centre) or _seen_along(zone.normal.mean(axis=0))
-    return _from_pole(normal, centre) or _seen_along(zone.normal.mean(axis=0))
+        return _unrolled(axes[2], *middle, centre.mean(axis=0))
+    return _from_pole(*middle, centre.mean(axis=0))
 
 
 def plan_axes(normal: np.ndarray) -> tuple[np.ndarray, tuple[str, str]]:
@@ -79,14 +82,11 @@ def _middle(normal: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, float] 
     return (point, radius) if np.abs(radii - radius).max() <= _ROUND * radius else None
 
 
-def _unrolled(axis: np.ndarray, normal: np.ndarray, centre: np.ndarray) -> LaidFlat | None:
-    """Around an axis, from the middle of what is pressed on."""
+def _unrolled(axis: np.ndarray, point: np.ndarray, radius: float, pressed: np.ndarray) -> LaidFlat:
+    """Around an axis through a point, from the middle (3,) of what is pressed on."""
     axis = np.where(np.abs(axis) < 1e-3, 0.0, axis)
     axis = axis / np.linalg.norm(axis) * np.sign(axis[np.abs(axis).argmax()])
-    if (found := _middle(normal, centre)) is None:
-        return None
-    point, radius = found
-    first = centre.mean(axis=0) - point
+    first = pressed - point
     first = first - axis * (first @ axis)
     if np.linalg.norm(first) < _ROUND * radius:  # pressed all around
         first = np.eye(3)[int(np.abs(axis).argmin())]
@@ -106,12 +106,9 @@ def _unrolled(axis: np.ndarray, normal: np.ndarray, centre: np.ndarray) -> LaidF
     )
 
 
-def _from_pole(normal: np.ndarray, centre: np.ndarray) -> LaidFlat | None:
-    """From the middle of what is pressed, or the first axis, along arcs to all sides."""
-    if (found := _middle(normal, centre)) is None:
-        return None
-    point, radius = found
-    pole = centre.mean(axis=0) - point
+def _from_pole(point: np.ndarray, radius: float, pressed: np.ndarray) -> LaidFlat:
+    """Around a point, from the middle (3,) of what is pressed, or z, along arcs to all sides."""
+    pole = pressed - point
     pole = pole if np.linalg.norm(pole) > _ROUND * radius else np.eye(3)[2]
     pole = pole / np.linalg.norm(pole)
     axes, names = plan_axes(pole)

@@ -12,20 +12,17 @@ import meshio
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..case.acting import Probe
 from ..case.model import Case
 from ..system.errors import InputError
 from ..system.progress import Clock
 from .equilibrium.problem import ContactProblem
 from .options import LEAN
 from .scene.bodies import ONE_PLACE, bodies_of, body_names, without_unloaded
-from .scene.probing import cells_at, face_at, nearest_cells, place_of
-from .scene.scene import Scene, ZoneScene, build_model, scene_of
+from .scene.probing import cell_at, faces_at
+from .scene.scene import Scene, ZoneScene, build_model, build_scene
 
 # Bodies that overlap by more than this share of the smaller one are no problem of small strain.
 _DEEPEST = 0.1
-# Contact surfaces, which faces only approximate, are where a probe is to this share of the length.
-_ON_SURFACE = 1e-2
 
 
 def refuse_unfit(scene: Scene) -> None:
@@ -40,10 +37,10 @@ def refusals_on(case: Case, mesh: meshio.Mesh) -> Iterator[InputError]:
     Bodies that move may meet only where the first step brings them.
     """
     try:
-        model = build_model(case, mesh, LEAN, Clock())
         if case.moving:
+            build_model(case, mesh, LEAN, Clock())
             return
-        scene = scene_of(model, model.groups, Clock())
+        scene = build_scene(case, mesh)
         found = list(refusals(scene))
         yield from found
         if not found:
@@ -58,8 +55,8 @@ def refusals(scene: Scene) -> Iterator[InputError]:
         yield from _groups(scene, i, zone)
         yield from _deep_overlap(scene, i, zone)
     yield from _unmerged(scene)
-    for name, probe in scene.case.probes.items():
-        yield from _probe(scene, name, probe)
+    for name in scene.case.probes:
+        yield from _probe(scene, name)
 
 
 def _groups(scene: Scene, i: int, zone: ZoneScene) -> Iterator[InputError]:
@@ -115,23 +112,14 @@ def _unmerged(scene: Scene) -> Iterator[InputError]:
         yield InputError(scene.case.path, "mesh", None, allowed)
 
 
-def _probe(scene: Scene, name: str, probe: Probe) -> Iterator[InputError]:
+def _probe(scene: Scene, name: str) -> Iterator[InputError]:
     """A point outside of what it is asked of, or in two bodies at once."""
-    key = f"probes.{name}.{'group' if probe.group else 'at'}"
-    value, allowed = probe.group or [*(probe.at or ())], ""
-    if probe.zone:
-        zone = next(zone for zone in scene.zones if zone.zone.name == probe.zone)
-        faces = [(block.type.name, block.nodes, block.number) for block in zone.slave_faces]
-        places = scene.points[scene.probed[name]] if probe.group else [place_of(scene, probe)]
-        away = max(face_at(scene, faces, place).distance for place in places)
-        if away > _ON_SURFACE * scene.length:
-            allowed = f"is {away:.3g} from the slave surface of {probe.zone}"
-    elif not probe.group:
-        inside = cells_at(scene, probe)
-        if not inside:
-            nearest = nearest_cells(scene, probe)[0].distance
-            allowed = f"no cell is there; the nearest is {nearest:.3g} away"
-        elif len({scene.body[one.nodes[0]] for one in inside}) > 1:
-            allowed = "bodies meet there; name the cells of one of them (within)"
-    if allowed:
-        yield InputError(scene.case.path, key, value, allowed)
+    probe = scene.case.probes[name]
+    try:
+        if probe.zone:
+            zone = next(zone for zone in scene.zones if zone.zone.name == probe.zone)
+            faces_at(scene, name, [(block.type.name, block.nodes) for block in zone.slave_faces])
+        elif not probe.group:
+            cell_at(scene, name)
+    except InputError as error:
+        yield error

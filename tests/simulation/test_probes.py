@@ -1,14 +1,19 @@
 """Values at points and nodes: fields that the cells reproduce are found to the last digit."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from solver.case.reader import parse_case
 from solver.simulation.fit import refusals_on
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.results import read_result, write_result
+from solver.verification.run import mesh_of
 from tests.scenes import block_mesh, changed_case, moved
+from tests.workflow.projects import ROOT
 
 PROBES = """\
 groups: {rim: {of: nodes, box: {low: [0, 1], high: [1, 1]}}}
@@ -105,3 +110,13 @@ def test_all_probes_are_refused_before_the_solve():
     assert len(told) == 2
     assert "probes.inside.at = [0.3, -1.7]: no cell is there" in told[0]
     assert "probes.middle.at = [0.51, 0.5]: is 0.5 from the slave surface" in told[1]
+
+
+def test_a_probe_that_a_moving_surface_leaves_is_refused():
+    """A corner of the long block, once the short one has slid on by a face."""
+    text = (ROOT / "cases/motion/slide-a.yaml").read_text()
+    corner = "  corner: {of: nodes, within: bottom, box: {low: [-0.1, -0.1], high: [0.1, 0.1]}}\n"
+    text = text.replace("groups:\n", f"groups:\n{corner}", 1)
+    case = parse_case(text + "probes: {face: {group: corner, zone: interface}}\n", Path("p.yaml"))
+    with pytest.raises(InputError, match=r"probes\.face\.group = 'corner': is 5 from the slave"):
+        simulate(case.as_solved(True), mesh_of(case))

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from ...case.acting import Step
+from ...lac.cells.faces import surface_nodes
 from ...lac.motions import motion_fields, support_resistance, unheld_motion
 from ...lac.operator import without_round_off
 from ...lac.roughness import Smooth, smoothed
@@ -171,9 +172,8 @@ def _smooth_gaps(scene: Scene) -> sparse.csr_matrix | None:
         if zone.zone.normal != "element" or operator.nodes is not None or scene.space < 3:
             continue
         faces = [(b.number, b.nodes) for b in zone.slave_faces]
-        slave = np.unique(np.concatenate([b.nodes.ravel() for b in zone.sub_faces]))
-        about = Smooth(scene.points, faces, slave, surface.normal, surface.area, zone.near)
-        rows[-1] = smoothed(operator.matrix, about)
+        about = faces, surface_nodes(zone.sub_faces), surface.normal, surface.area, zone.near
+        rows[-1] = smoothed(operator.matrix, Smooth(scene.points, *about))
         bent = bent or rows[-1] is not operator.matrix
     slips = [row for zone in scene.zones for row in zone.operator.slip]
     return sparse.vstack([*rows, *slips]).tocsr() if bent else None

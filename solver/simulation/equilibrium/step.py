@@ -16,7 +16,7 @@ def solve_step(
     start: np.ndarray | None = None,
     before: Step | None = None,
 ) -> tuple[Equilibrium, Recovered]:
-    """The state of a step and its recovered pressure; SolveError where there is none.
+    """Solve a step for its state and recovered pressure; SolveError if it has no solution.
 
     `last`: the state that friction goes on from; without friction the search for the status starts
     from `start` (k,), that of the step `before`.

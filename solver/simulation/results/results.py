@@ -16,7 +16,7 @@ from ..equilibrium.problem import ContactProblem
 from ..equilibrium.recovery import Recovered, RecoveredZone
 from ..equilibrium.state import Equilibrium
 from ..scene.bodies import body_names, meshed_cells
-from ..scene.probing import cells_at, face_at, place_of
+from ..scene.probing import cell_at, faces_at, places_of
 from ..scene.scene import Scene, ZoneScene
 from .balance import (
     imbalances,
@@ -302,33 +302,29 @@ def zone_friction(zone: ZoneScene, state: Equilibrium, field: RecoveredZone | No
 def probed(
     scene: Scene, zones: Sequence[ZoneResult], displacement: np.ndarray, stress: np.ndarray
 ) -> dict[str, ProbeResult]:
-    """The values at each probe of the case."""
+    """The values at each probe of the case; InputError where a point is in no body, or in two."""
     found = {}
     for name, probe in scene.case.probes.items():
-        if probe.group:
-            nodes = scene.probed[name]
-            places = scene.points[nodes]
-        else:
-            places = place_of(scene, probe)[None]
+        places = places_of(scene, name)
+        none = np.full(len(places), np.nan)
         if probe.zone:
             zone = next(zone for zone in zones if zone.name == probe.zone)
-            found[name] = _on_surface(scene, zone, places)
+            found[name] = _on_surface(scene, zone, name, places)
             continue
         if probe.group:
+            nodes = scene.probed[name]
             moved, tensor = displacement[nodes], stress[nodes]
         else:
-            cell = cells_at(scene, probe)[0]
+            cell = cell_at(scene, name)
             moved, tensor = (cell.weights @ f[cell.nodes][None] for f in (displacement, stress))
-        none = np.full(len(places), np.nan)
         found[name] = ProbeResult(places + scene.origin, moved, tensor, none)
     return found
 
 
-def _on_surface(scene: Scene, zone: ZoneResult, places: np.ndarray) -> ProbeResult:
+def _on_surface(scene: Scene, zone: ZoneResult, name: str, places: np.ndarray) -> ProbeResult:
     """The contact pressure where a zone's slave surface is nearest to local places (k, dim)."""
-    pressure = np.empty(len(places))
-    for i, place in enumerate(places):
-        face = face_at(scene, zone.faces, place)
+    pressure, faces = np.empty(len(places)), [(kind, nodes) for kind, nodes, _ in zone.faces]
+    for i, face in enumerate(faces_at(scene, name, faces)):
         owner = zone.faces[face.block][2][face.number]
         at = face.nodes[None], np.array([owner]), face.reference[None]
         pressure[i] = pressure_on(scene.points + scene.origin, zone, face.type.name, *at)[0, 0]

@@ -1,39 +1,52 @@
-"""Where the probes of a case are: the cells and the faces at their places."""
+"""Where the probes of a case are: the cells and the faces at their places.
 
-from collections.abc import Iterable
+All raise InputError for a point outside of what it is asked of, or in two bodies at once.
+"""
 
 import numpy as np
 
-from ...case.acting import Probe
 from ...mechanics.fem.locate import Located, locate
+from ...system.errors import InputError
 from .scene import Scene
 
-# A point is in a body, and in two of them, to this share of the model's length.
-_NEAR = 1e-6
+# A point is in a body, and in two of them, to this share of the model's length; and on a contact
+# surface, which its faces only approximate, to the second.
+_NEAR, _ON_SURFACE = 1e-6, 1e-2
 
 
-def place_of(scene: Scene, probe: Probe) -> np.ndarray:
-    """The local place (dim,) of a point."""
-    return np.array(probe.at) - scene.origin
+def places_of(scene: Scene, name: str) -> np.ndarray:
+    """The local places (k, dim) of a probe: a point, or the nodes of a group."""
+    probe = scene.case.probes[name]
+    return scene.points[scene.probed[name]] if probe.group else np.array([probe.at]) - scene.origin
 
 
-def nearest_cells(scene: Scene, probe: Probe) -> list[Located]:
-    """The cells at or near the point of a probe, of those that it names; the nearest first."""
-    blocks = list(scene.mesh.cells.items())
+def cell_at(scene: Scene, name: str) -> Located:
+    """The cell that holds the point of a probe."""
+    probe, blocks = scene.case.probes[name], list(scene.mesh.cells.items())
     if probe.within:
         given = scene.given.groups[probe.within]
-        blocks = [(name, cells[scene.mesh.members(name, given)]) for name, cells in blocks]
-    return locate(scene.points, blocks, place_of(scene, probe))
+        blocks = [(kind, cells[scene.mesh.members(kind, given)]) for kind, cells in blocks]
+    found = locate(scene.points, blocks, places_of(scene, name)[0])
+    inside = [one for one in found if one.distance <= _NEAR * scene.length]
+    if not inside:
+        allowed = f"no cell is there; the nearest is {found[0].distance:.3g} away"
+        raise _refusal(scene, name, allowed)
+    if len({scene.body[one.nodes[0]] for one in inside}) > 1:
+        raise _refusal(scene, name, "bodies meet there; name the cells of one of them (within)")
+    return inside[0]
 
 
-def cells_at(scene: Scene, probe: Probe) -> list[Located]:
-    """Those of them that hold it."""
-    near = nearest_cells(scene, probe)
-    return [one for one in near if one.distance <= _NEAR * scene.length]
+def faces_at(scene: Scene, name: str, faces: list[tuple[str, np.ndarray]]) -> list[Located]:
+    """The slave faces, of those of its zone, that are nearest to each place of a probe."""
+    found = [locate(scene.points, faces, place)[0] for place in places_of(scene, name)]
+    away = next((f.distance for f in found if f.distance > _ON_SURFACE * scene.length), None)
+    if away is not None:
+        zone = scene.case.probes[name].zone
+        raise _refusal(scene, name, f"is {away:.3g} from the slave surface of {zone}")
+    return found
 
 
-def face_at(
-    scene: Scene, faces: Iterable[tuple[str, np.ndarray, np.ndarray]], place: np.ndarray
-) -> Located:
-    """The face of a zone that is nearest to a local place (dim,)."""
-    return locate(scene.points, [(name, nodes) for name, nodes, _ in faces], place)[0]
+def _refusal(scene: Scene, name: str, allowed: str) -> InputError:
+    probe = scene.case.probes[name]
+    key = f"probes.{name}.{'group' if probe.group else 'at'}"
+    return InputError(scene.case.path, key, probe.group or list(probe.at or ()), allowed)
