@@ -1,7 +1,7 @@
 """Faults at crossings of options: each option alone stays exact under them."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,16 +9,22 @@ import pytest
 
 from solver.mechanics.linear import systems
 from solver.mechanics.mortar.coulomb import CoulombContact
+from solver.simulation.judgement import validity
+from solver.simulation.results import results
 from solver.simulation.scene import operators
 from solver.simulation.scene.parts import strain
 from solver.simulation.scene.parts.springs import Springs
 from solver.simulation.scene.parts.strain import StrainFields
 from solver.simulation.scene.scene import Scene
+from tests.pairs.options import plain_in
 
 
 @dataclass(frozen=True)
 class Fault:
-    """`what` is wrong where `options` meet; `patch` makes `name` of `owner` faulty."""
+    """`what` is wrong where `options` meet; `patch` makes `name` of `owner` faulty.
+
+    `cells` of both sides, where it takes others than the plain ones.
+    """
 
     name: str
     what: str
@@ -27,6 +33,15 @@ class Fault:
     attribute: str
     patch: Callable[[Any], Any]
     space: str = "strain"
+    cells: str = ""
+
+    @property
+    def plain(self) -> dict[str, str]:
+        """The plain row that the options are set in."""
+        row = plain_in(self.space)
+        return row | dict.fromkeys(
+            ("slave cells", "master cells"), self.cells or row["slave cells"]
+        )
 
     def plant(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Plant it."""
@@ -84,7 +99,50 @@ def _interference_lost_with_rigid(true: Any) -> Any:
     return gaps
 
 
+def _normalised_one_by_one(_: Any) -> Any:
+    def frames(rows: np.ndarray) -> np.ndarray:
+        turned = np.swapaxes(rows, 1, 2)
+        return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+    return frames
+
+
+def _slips_of_all(true: Any) -> Any:
+    def result(scene: Any, zone: Any, state: Any, *more: Any) -> Any:
+        found = true(scene, zone, state, *more)
+        friction = state.friction and results.zone_friction(zone, state, None)
+        return replace(found, friction=friction)
+
+    return result
+
+
 FAULTS = (
+    Fault(
+        "frames-of-nodes",
+        "frames of nodes whose directions are normalised one by one",
+        {"interface": "curved", "friction": "held"},
+        operators,
+        "_orthonormal",
+        _normalised_one_by_one,
+        "solid",
+        "TETRA10",
+    ),
+    Fault(
+        "slips-of-all-zones",
+        "slips are looked for in a zone without friction",
+        {"friction": "held", "second zone": "plain"},
+        results,
+        "_zone_result",
+        _slips_of_all,
+    ),
+    Fault(
+        "overlap-of-a-clearance",
+        "the clearance of the last zone alone tells that meshes may lie in one another",
+        {"gap": "clearance, overlap", "second zone": "plain"},
+        validity,
+        "_apart",
+        lambda true: lambda scene: true(replace(scene, zones=scene.zones[-1:])),
+    ),
     Fault(
         "rigid-diagonal",
         "unknowns of rigid bodies have no stiffness to divide by",

@@ -1,7 +1,9 @@
 """How far a solve is from the exact state, and what came of a row."""
 
 import logging
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from solver.simulation.results.solution import Solution
 from solver.simulation.simulate import solved
 from solver.system.errors import InputError
 from solver.system.progress import Clock
+from solver.verification.judge import judge
+from solver.verification.results import read_result, write_result
+from solver.verification.verdict import UNRELIABLE
 
 from .options import Row
 from .problem import Problem, problem_of
@@ -20,6 +25,7 @@ EXACT, ROUNDING, _MARGIN = 1e-11, 1e-9, 10.0
 # Of a body 1e6 times stiffer, Young's modulus times a rounded displacement over a cell, over the
 # pressure: 2e9 · 2.2e-16 · 0.02 / (25 / 3).
 _STIFF = 1e-9
+_NEARLY = 0.99
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
@@ -54,7 +60,21 @@ def tried(row: Row) -> Outcome:
     allowed = min(ROUNDING, max(EXACT, _MARGIN * estimate))
     if row["materials"] == "stiff master":  # rounded displacements of its supports are stresses
         allowed = _MARGIN * _STIFF
+    if error <= allowed and (amiss := _amiss(solution)):
+        return Outcome("wrong", error, amiss)
     return Outcome("exact" if error <= allowed else "wrong", error, what)
+
+
+def _amiss(solution: Solution) -> str:
+    """What the program makes of an exact result: an alarm, or another one when read back."""
+    verdict = judge(solution, [])
+    if verdict.verdict == UNRELIABLE:
+        return f"false alarm: {verdict.reason}"
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "pairs.vtkhdf")
+        write_result(file, solution, [], {})
+        again = judge(read_result(file).solution, [])
+    return "" if again.plain() == verdict.plain() else "read back as another result"
 
 
 def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
@@ -90,6 +110,7 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
     strained = max(float(np.abs(b.stress).max()) / b.young for b in problem.bodies)
     size = max(float(np.abs(wanted).max()), placed.scale * strained)
     found["displacement"] = float(np.abs(moved - wanted)[seen].max() / size)
+    coefficient_of = {zone.name: zone.friction for zone in problem.case.zones}
     for zone in solution.zones:
         body = problem.bodies[0 if zone.name == "one" else -1]
         stress = placed.turn @ body.stress[:dim, :dim] @ placed.turn.T
@@ -98,8 +119,11 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
         pressed = np.einsum("md,md->m", traction, normal)
         found[f"pressure of {zone.name}"] = float(np.abs(zone.multiplier + pressed).max() / scale)
         found[f"gap of {zone.name}"] = float(np.abs(zone.gap).max() / placed.scale)
+        along = traction - pressed[:, None] * normal
+        bound = abs(coefficient_of[zone.name] * pressed)
+        slips = (bound > 0) & (np.linalg.norm(along, axis=1) > _NEARLY * bound)
+        found[f"status of {zone.name}"] = float(np.abs(zone.shown_status - 1 - slips).max())
         if zone.friction is not None:
-            along = traction - pressed[:, None] * normal
             error = np.abs(zone.friction.friction_traction[:, :dim] - along).max() / scale
             found[f"friction of {zone.name}"] = float(error)
     return found

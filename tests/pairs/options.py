@@ -29,7 +29,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "friction": ("none", "held", "stick", "slip", "slip back"),
     "recovery": ("none", "linear", "quadratic", "smooth", "automatic"),
     "stabilised": ("no", "yes"),
-    "gap": ("none", "meshed", "interference", "clearance", "clearance 0"),
+    "gap": ("none", "meshed", "interference", "clearance", "clearance 0", "clearance, overlap"),
     "master": ("meshed", "rigid", "rigid, by force", "plane"),
     "master size": ("coarser", "as fine", "finer"),
     "supports": ("imposed", "normal", "springs", "together", "cyclic"),
@@ -116,7 +116,7 @@ REFUSED = (
             ("supports", ("cyclic",), "a side that moves as another does"),
             ("also", ("strain",), "its components would have to turn"),
             ("also", ("temperature",), "its components would have to turn"),
-            ("gap", ("clearance", "clearance 0"), "motion finds the gap itself"),
+            ("gap", _not("gap", "none", "meshed", "interference"), "motion finds the gap itself"),
         )
     ),
     *_of_slave(
@@ -221,7 +221,7 @@ EXCLUDED = (
     Rule(
         {
             "friction": FRICTION,
-            "gap": ("meshed", "interference", "clearance"),
+            "gap": _not("gap", "none", "clearance 0"),
             "steps": _not("steps", "one"),
         },
         "a gap has no factor",
@@ -229,7 +229,7 @@ EXCLUDED = (
     Rule(
         {
             "second zone": ("friction",),
-            "gap": ("meshed", "interference", "clearance"),
+            "gap": _not("gap", "none", "clearance 0"),
             "steps": _not("steps", "one"),
         },
         "a gap has no factor",
@@ -246,16 +246,20 @@ EXCLUDED = (
         {"friction": ("none",), "second zone": ("same",), "master": ("plane",)}, "no second surface"
     ),
     Rule({"master": ("plane",), "second zone": _not("second zone", "none")}, "no second surface"),
+    Rule({"master": ("plane",), "gap": ("clearance, overlap",)}, "a plane has no mesh"),
     Rule({"master": ("plane",), "interface": SHAPED}, "a plane is no such surface"),
     Rule(
         {"interface": ("tilted",), "second zone": _not("second zone", "none")},
         "interfaces are not parallel",
     ),
     Rule(
-        {"interface": SHAPED, "gap": ("meshed", "interference", "clearance")},
+        {"interface": SHAPED, "gap": _not("gap", "none", "clearance 0")},
         "closes without a uniform state",
     ),
-    Rule({"interface": ("tilted",), "gap": ("meshed",)}, "the ends of the surfaces part"),
+    Rule(
+        {"interface": ("tilted",), "gap": ("meshed", "clearance, overlap")},
+        "the ends of the surfaces part",
+    ),
     Rule(
         {"interface": _not("interface", "flat"), "supports": ("together", "cyclic")},
         "displacements differ",

@@ -40,7 +40,7 @@ class Places(States):
             "curved": 0.1 * (4 * x * (1 - x) + y * (1 - y)),
         }[self.row["interface"]]
         points[:, -1] += shape * np.clip(1 - np.abs(z), 0, None)
-        if self.row["gap"] == "meshed":
+        if self.apart.any():
             above = np.zeros(len(points), dtype=bool)
             for block, cells in zip(mesh.cells, mesh.cell_sets["lower"], strict=True):
                 above[block.data[cells]] = True

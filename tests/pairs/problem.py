@@ -90,7 +90,7 @@ class _Builder(Places):
         if row["gap"] == "interference":
             zone["interference"] = scaled
         if row["gap"].startswith("clearance"):
-            zone["clearance"] = scaled if row["gap"] == "clearance" else 0
+            zone["clearance"] = scaled if row["gap"] != "clearance 0" else 0
         return zone
 
     def _second_zone(self) -> dict[str, Any]:

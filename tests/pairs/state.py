@@ -14,6 +14,8 @@ import numpy as np
 from .options import LINEAR, POINTS, RIGID, SHAPED, Row
 
 YOUNG, POISSON, PRESSURE, MU, SLIDE, GAP, STRAIN = 2000.0, 0.3, 25.0, 0.4, 0.004, 0.002, 1e-3
+# How deep meshes lie in one another where a clearance says how far the bodies are apart.
+OVERLAP = 0.3
 AXES = "xyz"
 
 
@@ -127,13 +129,14 @@ class States:
     @property
     def apart(self) -> np.ndarray:
         """How far the upper bodies are meshed from where they touch."""
-        return GAP * self.normal if self.row["gap"] == "meshed" else 0 * self.normal
+        far = {"meshed": GAP, "clearance, overlap": -OVERLAP}.get(self.row["gap"], 0.0)
+        return far * self.normal
 
     @property
     def moved(self) -> np.ndarray:
         """How far the master moves at the interface: it slides, and closes the gap."""
         slide = {"slip": SLIDE, "slip back": -SLIDE}.get(self.row["friction"], 0.0)
-        gap = {"meshed": GAP, "clearance": GAP, "interference": -GAP}.get(self.row["gap"], 0.0)
+        gap = {"none": 0.0, "clearance 0": 0.0, "interference": -GAP}.get(self.row["gap"], GAP)
         return slide * self.along - gap * self.normal
 
     def _states(self) -> Iterator[Body]:

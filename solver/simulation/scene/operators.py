@@ -187,7 +187,7 @@ def with_contact_frames(
         there = size > _ROUND_OFF * size.max(axis=(1, 2), keepdims=True)
         mixed = (there.sum(axis=2) > 1).any(axis=1)
         turned.append(nodes[mixed])
-        frames.append(np.linalg.qr(np.swapaxes(coefficients[mixed], 1, 2))[0])
+        frames.append(_orthonormal(coefficients[mixed]))
     nodes = np.concatenate(turned)
     if not len(nodes):
         return free
@@ -195,6 +195,11 @@ def with_contact_frames(
     unknowns = free.basis.indices[free.basis.indptr[dofs]]
     rotation = _rotation(free.basis.shape[1], unknowns, np.concatenate(frames))
     return FreeMotion((free.basis @ rotation).tocsr(), free.offset, None)
+
+
+def _orthonormal(rows: np.ndarray) -> np.ndarray:
+    """Directions (m, dim, dim), in columns, of which the first k span the first k `rows`."""
+    return np.asarray(np.linalg.qr(np.swapaxes(rows, 1, 2))[0])
 
 
 def _columns(operator: GapOperator, dim: int) -> np.ndarray:
