@@ -37,9 +37,9 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "also": ("nothing", "body force", "strain", "temperature"),
     "steps": ("one", "factors", "path"),
     "motion": ("small", "large"),
-    "materials": ("equal", "stiff master", "nearly incompressible"),
+    "materials": ("equal", "stiff master", "nearly incompressible", "mixed form"),
     "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
-    "form": ("as it is", "exchanged", "renumbered", "rotated", "far", "other units"),
+    "form": ("as it is", "exchanged", "renumbered", "perturbed", "rotated", "far", "other units"),
     "work": ("lean", "everything"),
 }
 PLAIN = {name: values[0] for name, values in OPTIONS.items()}
@@ -108,6 +108,11 @@ REFUSED = (
         {"supports": ("cyclic",), "treatment": _not("treatment", "lac", "quadrature")},
         "more multipliers than nodes that move",
         ("treatment", "cyclic"),
+    ),
+    Rule(
+        {"materials": ("mixed form",), "space": ("stress",)},
+        "plane stress has no incompressible limit",
+        ("form", "plane stress"),
     ),
     *(
         Rule({"motion": ("large",), name: values}, why, ("motion", *values[:1]))
@@ -289,6 +294,8 @@ EXCLUDED = (
         {"interface": SHAPED, "treatment": ("node_to_segment",)}, "points keep flat surfaces alone"
     ),
     Rule({"treatment": POINTS, "second zone": ("same",)}, "meshes of two sides differ"),
+    Rule({"treatment": POINTS, "form": ("perturbed",)}, "meshes of two sides differ"),
+    Rule({"supports": ("cyclic",), "form": ("perturbed",)}, "meshes of two sides differ"),
     Rule(
         {"supports": ("cyclic",), "second zone": _not("second zone", "none")},
         "nothing holds the body between",

@@ -26,6 +26,7 @@ _STEPS: dict[str, dict[str, Any]] = {
 }
 _FORMS: dict[str, dict[str, Any]] = {
     "renumbered": {"transform": {"renumber": 3}},
+    "perturbed": {"transform": {"perturb": 0.1}},
     "other units": {"units": {"length": "m", "stress": "kPa"}},
 }
 _MULTIPLIED = {
@@ -122,7 +123,7 @@ class _Builder(Places):
             "name": "pairs",
             "mesh": self.recipe(),
             "groups": self.groups(),
-            "materials": {b.name: {"young": b.young, "poisson": b.poisson} for b in self.bodies},
+            "materials": {b.name: self._material(b) for b in self.bodies},
             "supports": self.supports,
             "loads": self.loads,
             "contact": [self._zone()] + [self._second_zone()] * self.second,
@@ -137,6 +138,12 @@ class _Builder(Places):
         if row["steps"] != "one":
             _multiply(text, 1 / _LAST)
         return text | _STEPS.get(row["friction"], _STEPS.get(row["steps"], {}))
+
+    def _material(self, body: Body) -> dict[str, Any]:
+        material: dict[str, Any] = {"young": body.young, "poisson": body.poisson}
+        if self.row["materials"] == "mixed form" and not body.rigid:
+            material["form"] = "mixed"
+        return material
 
     def _act(self) -> None:
         """Supports and loads."""

@@ -1,14 +1,13 @@
 """The result file: whole, readable by others, and enough to make every check again."""
 
 from copy import deepcopy
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict
 
 import h5py
 import meshio
 import numpy as np
 import pytest
 
-from solver import solve_case
 from solver.case.reader import parse_case
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -17,29 +16,8 @@ from solver.verification.checks import run_checks
 from solver.verification.provenance import gather
 from solver.verification.results import read_result, write_result
 from tests.handmade import plane, solid
+from tests.same import in_order, read_back, same
 from tests.scenes import block_case, block_mesh, errors
-
-
-def same(a, b):
-    """Equal values, whatever holds them: NaN equals NaN, arrays element by element."""
-    if isinstance(a, meshio.Mesh):
-        blocks = [(m.points, [(c.type, c.data) for c in m.cells], m.cell_sets) for m in (a, b)]
-        return same(*blocks)
-    if hasattr(a, "__dataclass_fields__"):
-        return all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-    if isinstance(a, dict):
-        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
-    if isinstance(a, list | tuple):
-        return len(a) == len(b) and all(map(same, a, b))
-    return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")
-
-
-def in_order(solution):
-    """Tables of sub-faces and master faces have no order of their own."""
-    for zone in solution.zones:
-        zone.faces.sort(key=lambda faces: faces[0])
-        zone.master_faces.sort(key=lambda faces: faces[0])
-    return solution
 
 
 def retold(solution, old, new):
@@ -83,33 +61,10 @@ def test_faces_of_one_type_on_cells_of_two_types(tmp_path):
 
 
 def test_everything_comes_back(solution, written):
+    """Of solves with every pair of options: see `tests.pairs`."""
     again = read_result(written).solution
-    solution.case = again.case  # compared by the next test
     assert again.job == solution.job
-    assert same(in_order(solution), in_order(again))
-
-
-@pytest.mark.parametrize(
-    "case",
-    [
-        *("friction/rigid-cylinder-tria6", "friction/sliding-recovered"),
-        *("axisymmetric/hertz-sphere-recovered", "axisymmetric/tubes-nearly-incompressible"),
-        *("axisymmetric/ring-nodal", "loads/platen"),
-    ],
-)
-def test_a_solve_comes_back_whole(case, tmp_path):
-    """Friction, rigid bodies, recovered pressures, mixed form, multipliers at nodes, probes.
-
-    But for the edges of contact in each step: those of the last one are kept with the zone.
-    """
-    solution = solve_case(f"cases/{case}.yaml").solution
-    for step in solution.steps:
-        step.resultants = {k: replace(r, edges=None) for k, r in step.resultants.items()}
-    path = tmp_path / "result.vtkhdf"
-    write_result(path, solution, [], {})
-    again = read_result(path).solution
-    solution.case = again.case
-    assert same(in_order(solution), in_order(again))
+    assert read_back(solution, again)
 
 
 def test_zones_that_share_a_cell_type_come_back_apart(tmp_path):
