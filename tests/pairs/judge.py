@@ -27,6 +27,11 @@ EXACT, ROUNDING, _MARGIN = 1e-11, 1e-9, 10.0
 # pressure: 2e9 · 2.2e-16 · 0.02 / (25 / 3).
 _STIFF = 1e-9
 _NEARLY = 0.99
+_WORK = {
+    "lean": LEAN,
+    "everything": Options.everything(),
+    "multigrid": Options(solver="multigrid"),
+}
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
@@ -47,8 +52,7 @@ def tried(row: Row) -> Outcome:
     clock = Clock()
     try:
         problem = problem_of(row)
-        options = Options.everything() if row["work"] == "everything" else LEAN
-        solution = solved(problem.case, problem.mesh, options, clock)
+        solution = solved(problem.case, problem.mesh, _WORK[row["work"]], clock)
     except InputError as error:
         return Outcome("refused", np.inf, str(error))
     except SolveError as error:

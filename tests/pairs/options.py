@@ -40,7 +40,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "materials": ("equal", "stiff master", "nearly incompressible", "mixed form"),
     "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
     "form": ("as it is", "exchanged", "renumbered", "perturbed", "rotated", "far", "other units"),
-    "work": ("lean", "everything"),
+    "work": ("lean", "everything", "multigrid"),
 }
 PLAIN = {name: values[0] for name, values in OPTIONS.items()}
 FRICTION = ("held", "stick", "slip", "slip back")

@@ -11,7 +11,6 @@ from solver.mechanics.fem.supports import Copies, Fixed, copied, free_motion
 from solver.mesh import generate
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
-from tests.scenes import POISSON, PRESSURE, YOUNG, block_mesh, changed_case
 
 RINGS = {
     "recipe": "rings",
@@ -51,26 +50,6 @@ def test_a_quarter_of_nested_tubes_as_a_sector_is_that_between_mirrors():
     assert cyclic.reactions[-1].group == "cyclic"
     total, other = (sum(r.force for r in s.reactions) for s in (cyclic, mirrors))
     assert total == pytest.approx(other, abs=1e-10 * abs(other).max())
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_periodic_sides_keep_the_width(dim):
-    """Between sides that are copies, shifted, the strain across is zero: σ_xx = ν/(1 − ν) σ_yy."""
-    ends = [[0.0] * (dim - 1) + [y] for y in (-1, 1)]
-    shift = [1.0] + [0.0] * (dim - 1)
-    copy = f"{{group: farx, cyclic: {{of: symx, shift: {shift}}}}}"
-    copy += "".join(f"\n  - {{at: {end}, fix: [x]}}" for end in ends)
-    sides = [("{group: symx, fix: [x]}", copy)]
-    if dim == 3:
-        sides.append(("{group: symy, fix: [y]}", "{group: [symy, fary], fix: [y]}"))
-    pair = ("QUAD8", "TRIA6") if dim == 2 else ("HEXA8", "HEXA20")
-    solution = simulate(changed_case(dim, *sides), block_mesh(*pair, (2, 3)))
-    lateral = -POISSON / (1 - POISSON) * PRESSURE
-    assert solution.stress[:, 0] == pytest.approx(lateral, rel=1e-10)
-    assert solution.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-10)
-    sunk = PRESSURE / YOUNG * (1 + POISSON) * (1 - 2 * POISSON) / (1 - POISSON)
-    height = solution.mesh.points[:, -1] + 1
-    np.testing.assert_allclose(solution.displacement[:, -1], -sunk * height, atol=1e-12)
 
 
 def test_a_node_on_the_axis_is_its_own_copy():

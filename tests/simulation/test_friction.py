@@ -17,7 +17,6 @@ from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.norms import errors
-from solver.verification.results import read_result, write_result
 from solver.verification.run import mesh_of, refined
 
 HERE, CASES = Path(__file__).parent, Path(__file__).parents[2] / "cases"
@@ -268,21 +267,6 @@ def test_friction_of_two_zones_with_their_own_coefficients():
         assert (size <= given.friction * zone.multiplier * (1 + 1e-9) + 1e-12).all()
 
 
-def test_a_result_file_keeps_friction(tmp_path):
-    solution = solved(plate(0.3, 0.05))
-    path = tmp_path / "result.vtkhdf"
-    write_result(path, solution, run_checks(solution), {})
-    back = read_result(path).solution
-    before, after = solution.zones[0], back.zones[0]
-    for name in ("friction_traction", "slip", "slip_total", "status"):
-        np.testing.assert_array_equal(getattr(after.friction, name), getattr(before.friction, name))
-    assert back.steps[0].dissipation == solution.steps[0].dissipation
-    np.testing.assert_array_equal(after.resultants.friction, before.resultants.friction)
-    np.testing.assert_array_equal(
-        back.steps[0].resultants["interface"].stick, before.resultants.stick
-    )
-
-
 def test_each_row_of_gap_and_slip_has_an_unknown_of_its_own_on_a_tilted_interface():
     tilted = ("plane: strain", "plane: strain\ntransform: {rotate: 25}")
     turned = ("normal: [1, 0]", f"normal: [{np.cos(np.radians(25))}, {np.sin(np.radians(25))}]")
@@ -295,9 +279,6 @@ def test_each_row_of_gap_and_slip_has_an_unknown_of_its_own_on_a_tilted_interfac
 @pytest.mark.parametrize(
     ("change", "key", "why"),
     [
-        (("friction: 0.3", "friction: 0.3, treatment: nodal"), "contact[0].treatment", "lac"),
-        (("friction: 0.3", "friction: 0.3, normal: nodal"), "contact[0].normal", "element"),
-        (("friction: 0.3", "friction: 0.3, stabilised: true"), "contact[0].stabilised", "false"),
         (("friction: 0.3", "friction: -0.1"), "contact[0].friction", "from 0 to 10"),
         (("friction: 0.3", "friction: 0.1*x"), "contact[0].friction", "from 0 to 10"),
         (

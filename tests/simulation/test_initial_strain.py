@@ -174,13 +174,6 @@ def test_a_heated_block_between_walls_presses_on_the_other(plane, pair, counts, 
     assert check.error < 1e-11
 
 
-def test_mixed_form_and_nearly_incompressible_material_between_walls():
-    nearly = ("poisson: 0.3", "poisson: 0.4999")
-    found = between_walls("strain", ("QUAD8", "QUAD4"), False, (3, 2), nearly)
-    exact = YOUNG * E / 2 / (1 - 0.4999)
-    assert np.abs(found.zones[0].multiplier / exact - 1).max() < 1e-9
-
-
 BAR = """\
 name: bar
 mesh: {recipe: bricks, bricks: []}

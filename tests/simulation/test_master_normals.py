@@ -86,11 +86,6 @@ def test_refused_on_a_master_with_an_edge():
         solve_case(case)
 
 
-def test_refused_with_treatments_that_have_normals_of_their_own():
-    with pytest.raises(InputError, match="has normals of its own; allowed: element"):
-        solve_case(cylinder("master", treatment="node_to_segment"))
-
-
 @pytest.mark.parametrize(
     "change", [{"renumber": 11}, {"scale": 0.1}, {"scale": 0.0037}, {"translate": [0.0, -13.77]}]
 )

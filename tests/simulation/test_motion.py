@@ -17,7 +17,6 @@ from solver.simulation.simulate import simulate, solved
 from solver.system.errors import InputError
 from solver.system.progress import Clock
 from solver.verification.checks import run_checks
-from solver.verification.results import read_result, write_result
 from solver.verification.run import mesh_of
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
@@ -325,20 +324,6 @@ def test_small_motion_is_that_of_linear_theory():
     assert not other.motion.any()
     assert any("followed" in line.what for line in other.plan)
     assert not any("followed" in line.what for line in one.plan)
-
-
-def test_a_result_keeps_all_positions(tmp_path):
-    solution = run(moving(reference={"kind": "analytical", "contact_pressure": 2.5}))
-    write_result(tmp_path / "a.vtkhdf", solution, [], {})
-    found = read_result(tmp_path / "a.vtkhdf").solution
-    assert len(found.earlier) == 4
-    for one, other in zip(solution.earlier, found.earlier, strict=True):
-        assert np.array_equal(one.points, other.points)
-        for name, values in one.of_cells.items():
-            assert np.array_equal(values, other.of_cells[name], equal_nan=True), name
-    assert np.array_equal(solution.motion, found.motion)
-    assert np.array_equal(solution.mesh.points, found.mesh.points)
-    assert [step.work for step in found.steps] == [step.work for step in solution.steps]
 
 
 def test_a_wrong_pressure_at_an_earlier_position_is_noticed():

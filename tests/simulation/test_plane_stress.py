@@ -50,12 +50,6 @@ def test_a_press_fit_of_thin_rings():
     assert rings.stress(x, 0)[0, 2] == 0
 
 
-def test_the_mixed_form_is_refused():
-    mixed = ("poisson: 0.3", "poisson: 0.3, form: mixed")
-    with pytest.raises(InputError, match=r"materials.all.form = 'mixed': plane stress has no inc"):
-        changed_case(2, THIN, mixed)
-
-
 @pytest.mark.parametrize(
     ("change", "why"),
     [

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from solver import solve_case
-from solver.system.errors import InputError
 from tests.patches import force_solver
-from tests.scenes import PRESSURE, block_case, block_mesh
 
 STIFF = {"bottom": ("QUAD4", 16), "top": ("QUAD4", 8), "young": (1e5, 1e3)}
 """A fine, stiff slave on a coarse, soft master."""
@@ -103,22 +101,6 @@ def test_it_converges_faster_than_plain_contact():
     assert gaps[1] / gaps[2] > 7
 
 
-@pytest.mark.parametrize(("bottom", "top"), [("QUAD4", "TRIA6"), ("TETRA4", "PYRA13")])
-def test_the_patch_test_stays_exact(bottom, top):
-    dim = 2 if bottom == "QUAD4" else 3
-    case = block_case(dim, zone=", stabilised: true")
-    found = solve_case(case, block_mesh(bottom, top, (3, 2)))
-    assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
-
-
-def test_the_patch_test_stays_exact_by_multigrid():
-    case = block_case(3, zone=", stabilised: true")
-    with force_solver("multigrid"):
-        found = solve_case(case, block_mesh("PENTA6", "HEXA8", (4, 3)))
-    assert "multigrid" in found.solution.linear_solver
-    assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
-
-
 def check_like_a_factor(case, poisson, close):
     """Statuses by multigrid are a factor's; pressures to `close` parts of the peak.
 
@@ -171,23 +153,7 @@ def test_the_plan_tells_the_gaps_that_it_leaves():
     assert f"{np.abs(zone.gap).max():.1e}" in line
 
 
-def test_refused_where_pressures_belong_to_nodes():
-    with pytest.raises(
-        InputError, match="no pressure that could be stabilised; allowed there: lac"
-    ):
-        solve_case(waves(**STIFF, stabilised=True, treatment="nodal"))
-
-
 # Multipliers at slave vertices, with no unknown of their own, in systems solved by multigrid.
-
-
-@pytest.mark.parametrize("cells", [("HEXA8", "TETRA4"), ("TETRA10", "HEXA20")])
-def test_the_patch_test_is_exact(cells):
-    case = block_case(3, zone=", treatment: nodal")
-    with force_solver("multigrid"):
-        found = solve_case(case, block_mesh(*cells, (4, 3)))
-    assert "multigrid" in found.solution.linear_solver
-    assert found.pressure == pytest.approx(PRESSURE, rel=1e-12)
 
 
 @pytest.mark.parametrize("treatment", ["nodal", "uncut"])

@@ -92,19 +92,6 @@ def test_springs_on_a_slave_surface_act_on_its_cut_faces():
     assert solution.zones[0].multiplier == pytest.approx(PRESSURE, rel=1e-11)
 
 
-def test_a_disc_on_a_foundation_sinks_by_p_over_k():
-    text = CASE.replace("strain", "axisymmetric").replace(", {group: symx, fix: [x]}", "")
-    assert_stands(solved(text), PRESSURE / STIFF, lateral=POISSON, axial=1.0)
-
-
-def test_a_block_in_space_on_a_foundation():
-    text = CASE.replace("plane: strain\n", "")
-    text = text.replace("fix: [x]}", "fix: [x]}, {group: symy, fix: [y]}")
-    solution = solved(text, block_mesh("HEXA8", "TETRA4", (2, 2)))
-    low = solution.mesh.points[:, 2] == -1
-    assert solution.displacement[low, 2] == pytest.approx(-PRESSURE / STIFF, rel=1e-11)
-
-
 def test_springs_at_two_nodes_carry_half_the_load_each():
     """The lower block has one linear face below: equal nodal forces are the uniform state."""
     springs = "{at: [0, -1], spring: {y: 20.0}}, {at: [1, -1], spring: {y: 20.0}}"

@@ -3,7 +3,7 @@
 import pytest
 
 from solver.system.errors import InputError
-from tests.scenes import block_mesh, errors, solved
+from tests.scenes import errors, solved
 
 CASE = """\
 name: platen
@@ -40,23 +40,6 @@ def test_the_reaction_of_a_tie_is_a_moment_without_a_force():
 def test_without_the_tie_the_force_presses_on_one_side():
     loose = CASE.replace("  - {group: press, together: [y]}\n", "")
     assert errors(solved(loose))["pressure"] > 0.1
-
-
-def test_in_space_all_four_sides_stay_plane():
-    """The pressure is even; sides that stay plane do so under it anyway."""
-    text = CASE.replace("plane: strain\n", "").replace(
-        "symx, fix: [x]}", "symx, fix: [x]}\n  - {group: symy, fix: [y]}"
-    )
-    text = text.replace("base, fix: [y]", "base, fix: [z]").replace(
-        "together: [y]", "together: [z]"
-    )
-    text = text.replace("at: [1, 1], force: [0, -25.0]", "at: [1, 0, 1], force: [0, 0, -25.0]")
-    text = text.replace(
-        "loads:",
-        "groups: {side: {within: top, plane: {point: [1, 0, 0], normal: [1, 0, 0]}}}\nloads:",
-    )
-    text = text.replace("  - {group: press", "  - {group: side, together: [x]}\n  - {group: press")
-    assert max(errors(solved(text, block_mesh("HEXA8", "HEXA20", (2, 2)))).values()) < 1e-11
 
 
 def test_a_tie_resists_turning_and_is_refused_where_it_cannot_be():

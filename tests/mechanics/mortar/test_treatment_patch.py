@@ -14,7 +14,6 @@ from tests.scenes import (
     block_mesh,
     changed_case,
     errors,
-    moved,
 )
 
 PLANE = ["TRIA3", "TRIA6", "QUAD4", "QUAD8", "QUAD9"]
@@ -29,28 +28,6 @@ def solved(treatment, mesh, extra=""):
 
 def worst(solution):
     return max(errors(solution).values())
-
-
-@pytest.mark.parametrize("cells", PLANE + SOLID)
-def test_standard_mortar_passes(cells):
-    counts = (4, 3) if cells in PLANE else (3, 2)
-    for mesh in (block_mesh(cells, cells, counts), moved(block_mesh(cells, cells, counts), 0.02)):
-        solution = solved("nodal", mesh)
-        assert worst(solution) < 1e-12
-        assert solution.zones[0].closed.all()
-
-
-@pytest.mark.parametrize("cells", ["TRIA3", "QUAD4", "TETRA4", "HEXA8"])
-def test_dual_mortar_passes_on_a_positive_definite_system(cells):
-    solution = solved("nodal_dual", block_mesh(cells, "QUAD8" if cells in PLANE else "HEXA20"))
-    assert worst(solution) < 1e-12
-    assert solution.linear_solver == solved("lac", block_mesh(cells, cells)).linear_solver
-
-
-@pytest.mark.parametrize("treatment", POINTS)
-@pytest.mark.parametrize("cells", ["TRIA3", "QUAD8", "HEXA8", "HEXA27"])
-def test_points_pass_where_the_meshes_match(cells, treatment):
-    assert worst(solved(treatment, block_mesh(cells, cells, (3, 3)))) < 1e-12
 
 
 @pytest.mark.parametrize("cells", ["TRIA3", "QUAD8", "HEXA8", "HEXA27"])
