@@ -6,6 +6,7 @@ import meshio
 import numpy as np
 
 from solver.case.reader import load_case
+from solver.simulation.results.records import Cost, Fields, Places, Quality, Scalars
 from solver.simulation.results.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
 
 PLANE = """\
@@ -93,37 +94,42 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
             BodyInfo("top", {"QUAD4": 3}, 3, "master"),
         ],
         zones=[zone],
-        nodal_normal_stress=stress[:, 1].copy(),
-        balance={
-            "zone interface: force": 1e-15,
-            "reactions and loads: moment": 0.0,
-            "free nodes: force": 0.0,
-        },
-        acted={
-            "supports[0].group": np.array([0, 7, 14, 18]),
-            "supports[1].group": np.arange(7),
-            "loads[0].group": np.arange(18, 22),
-        },
+        fields=Fields(stress[:, 1].copy()),
+        quality=Quality(
+            balance={
+                "zone interface: force": 1e-15,
+                "reactions and loads: moment": 0.0,
+                "free nodes: force": 0.0,
+            }
+        ),
+        places=Places(
+            acted={
+                "supports[0].group": np.array([0, 7, 14, 18]),
+                "supports[1].group": np.arange(7),
+                "loads[0].group": np.arange(18, 22),
+            }
+        ),
         steps=[
             StepResult(0.5, 1, 0, 1e-16, 0.0, [{**seen, "pressure": 12.5}]),
             StepResult(1.0, 1, 0, 1e-16, 0.0, [{**seen, "pressure": 25.0}]),
         ],
-        length=50.0,
-        load_scale=25.0,
-        dofs=44,
-        macro_elements=2,
-        iterations=1,
-        linear_solver="by hand",
+        scalars=Scalars(length=50.0, load_scale=25.0),
         plan=[
             Line("refinement", "none: by hand", "refinement"),
             Line("refinement", "said twice"),
         ],
-        matrix_entries=352,
-        linear_iterations=3,
-        seconds={"mesh": 0.25, "solve": 0.5},
-        stage_cpu_seconds={"mesh": 0.25, "solve": 0.75},
-        cpu_seconds=0.75,
-        peak_memory_mb=1.0,
+        cost=Cost(
+            dofs=44,
+            macro_elements=2,
+            iterations=1,
+            linear_solver="by hand",
+            matrix_entries=352,
+            linear_iterations=3,
+            seconds={"mesh": 0.25, "solve": 0.5},
+            stage_cpu_seconds={"mesh": 0.25, "solve": 0.75},
+            cpu_seconds=0.75,
+            peak_memory_mb=1.0,
+        ),
     )
 
 
@@ -170,20 +176,20 @@ def solid(folder: Path) -> Solution:
             BodyInfo("top", {"PENTA6": 2}, 2, "master"),
         ],
         zones=[zone],
-        nodal_normal_stress=stress[:, 2].copy(),
-        balance={
-            "zone interface: force": 0.0,
-            "reactions and loads: force": 0.0,
-            "free nodes: force": 0.0,
-        },
-        acted={"supports[0].group": np.arange(4), "loads[0].group": np.arange(12, 16)},
+        fields=Fields(stress[:, 2].copy()),
+        quality=Quality(
+            balance={
+                "zone interface: force": 0.0,
+                "reactions and loads: force": 0.0,
+                "free nodes: force": 0.0,
+            }
+        ),
+        places=Places(
+            acted={"supports[0].group": np.arange(4), "loads[0].group": np.arange(12, 16)}
+        ),
         steps=[StepResult(1.0, 1, 0, 1e-16, 0.0, [])],
-        length=20.0,
-        load_scale=25.0,
-        dofs=51,
-        macro_elements=2,
-        iterations=1,
-        linear_solver="by hand",
+        scalars=Scalars(length=20.0, load_scale=25.0),
+        cost=Cost(dofs=51, macro_elements=2, iterations=1, linear_solver="by hand"),
         plan=[],
     )
 

@@ -74,7 +74,7 @@ def solved(text: str, mesh: meshio.Mesh | None = None, **as_solved) -> Solution:
     """The case in a text on a mesh, by default its own; its forces balance."""
     case = parse_case(text, Path("case.yaml")).as_solved(**{"swapped": False} | as_solved)
     solution = simulate(case, mesh or mesh_of(case))
-    assert max(solution.balance.values()) < 1e-12
+    assert max(solution.quality.balance.values()) < 1e-12
     return solution
 
 
@@ -161,5 +161,5 @@ def errors(solution, size: float = 1.0, pressure: float = PRESSURE) -> dict[str,
         "displacement": np.abs(solution.displacement - exact).max() / np.abs(exact).max(),
         "gap": np.abs(zone.gap).max() / size,
         "coverage": np.abs(zone.coverage - 1).max(),
-        "balance": max(solution.balance.values()),
+        "balance": max(solution.quality.balance.values()),
     }

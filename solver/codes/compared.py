@@ -13,6 +13,7 @@ from ..case.checks import CHECKS, ERRORS, Check
 from ..case.expressions import evaluate
 from ..mechanics.fem.stress import COMPONENTS, normal_stress
 from ..simulation.results.exact import ExactValues
+from ..simulation.results.records import Quality
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError
 from ..verification import samples
@@ -96,12 +97,13 @@ class Compared:
             if values is not None and np.isfinite(values[needed]).all():
                 known[name] = np.where(np.isfinite(values), values, 0.0)
         if (stress := known.get("stress")) is not None:
-            known["nodal_normal_stress"] = normal_stress(stress, self.model.direction)
+            normal = normal_stress(stress, self.model.direction)
+            known["fields"] = replace(frame.fields, normal_stress=normal)
         by_zone = {surface.zone.name: surface.zone for surface in self.pressures_by_zone}
         zones = [by_zone.get(zone.name, zone) for zone in frame.zones]
-        solution = replace(frame, zones=zones, **known)
-        solution.balance = self._balance()
-        solution.errors = self._norms(solution)
+        quality = Quality(balance=self._balance())
+        solution = replace(frame, zones=zones, quality=quality, **known)
+        solution.quality.errors = self._norms(solution)
         return solution
 
     def _norms(self, solution: Solution) -> dict[str, float]:
@@ -170,9 +172,9 @@ class Compared:
         ):
             if given:
                 found[name] = self._of_surfaces(quantity, given)
-        if self.solution.balance:
+        if self.solution.quality.balance:
             found["balance"] = samples.balance
-        wanted = self.solution.errors.keys() & ERRORS.keys()
+        wanted = self.solution.quality.errors.keys() & ERRORS.keys()
         found |= {name: samples.norm(name) for name in sorted(wanted)}
         return {name: self._kept(name, sampler) for name, sampler in found.items()}
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..case.model import Case
 from ..lac.cells.faces import FaceBlock, nodal_normals, surface_nodes, surface_points
 from ..simulation.results.exact import ExactValues
+from ..simulation.results.records import Cost, Fields, Scalars
 from ..simulation.results.results import body_infos
 from ..simulation.results.solution import Solution, ZoneResult
 from ..simulation.scene.scene import Scene, ZoneScene, build_scene
@@ -82,16 +83,11 @@ class Model:
             body=self.body,
             bodies=body_infos(self.scene),
             zones=[self._zone(zone) for zone in self.scene.zones],
-            nodal_normal_stress=np.full(n, np.nan),
-            balance={},
             steps=[],
-            length=self.length,
-            load_scale=max(loads, default=0.0) or self._largest_reference,
-            dofs=int(self.points.size),
-            macro_elements=sum(zone.count for zone in self.scene.zones),
-            iterations=0,
-            linear_solver="",
             plan=[],
+            scalars=Scalars(self.length, max(loads, default=0.0) or self._largest_reference),
+            fields=Fields(normal_stress=np.full(n, np.nan)),
+            cost=Cost(macro_elements=sum(zone.count for zone in self.scene.zones)),
         )
 
     @property

@@ -24,8 +24,16 @@ from ..case.checks import RELATIVE
 from ..case.model import job_name
 from ..case.typed import ONCE, Positive, Section, Text, Version, read_as
 from ..case.yaml import read_mapping
+from ..simulation.results.records import Cost
 from ..system.errors import InputError, hint
-from ..verification.verdict import SOLVED, CheckError, CheckResult, Verdict
+from ..verification.verdict import (
+    SOLVED,
+    CheckError,
+    CheckResult,
+    Foreign,
+    Problem,
+    Verdict,
+)
 from .files.map import CodeName
 
 FOLDER = "recorded"
@@ -110,15 +118,15 @@ def _verdict(file: RecordedFile, result: RecordedResult, case: str, family: str)
     worst = max(checks, key=lambda check: check.error, default=None)
     remarks = "; ".join(filter(None, (result.remark, file.remark)))
     return Verdict(
-        case=case,
-        family=family,
-        job=f"{case}@{file.code}-{file.version}",
+        problem=Problem(case=case, family=family, job=f"{case}@{file.code}-{file.version}"),
         verdict=SOLVED,
         reason=NOT_JUDGED,
         checks=checks,
         worst=CheckError(name=worst.name, error=worst.error) if worst else None,
-        seconds={} if result.seconds is None else {"total": result.seconds},
-        code=f"{file.code}-{file.version}",
-        code_version=file.version,
-        recorded={"date": file.date, "source": file.source, "remark": remarks},
+        cost=Cost(seconds={} if result.seconds is None else {"total": result.seconds}),
+        foreign=Foreign(
+            code=f"{file.code}-{file.version}",
+            code_version=file.version,
+            recorded={"date": file.date, "source": file.source, "remark": remarks},
+        ),
     )

@@ -35,7 +35,8 @@ from ..lac.errors import SolveError
 from ..system.errors import InputError, hint
 from ..system.process import printed_by, run_in_subprocess
 from ..system.progress import now
-from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict, write_verdict
+from ..verification.stored import write_verdict
+from ..verification.verdict import CRASHED, FAILED, REFUSED, Verdict
 from .compared import CHECKED_BY
 from .deck import Deck, UnsupportedError, deck_of
 from .files.map import CODE, Names

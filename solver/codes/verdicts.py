@@ -19,11 +19,13 @@ from scipy.spatial import cKDTree
 
 from ..case.model import job_name
 from ..lac.cells.catalogue import BY_MESHIO
+from ..simulation.results.records import Cost
 from ..system.files import seal, write_text
 from ..verification.checks import run_checks
 from ..verification.judge import judge, without_result
 from ..verification.run import mesh_of
-from ..verification.verdict import FAILED, PARTIAL, PASSED, SOLVED, Verdict, write_verdict
+from ..verification.stored import write_verdict
+from ..verification.verdict import FAILED, PARTIAL, PASSED, SOLVED, Files, Foreign, Verdict
 from .compared import CHECKED_BY, Compared
 from .contact import SurfaceValues
 from .placing import NEAR
@@ -162,7 +164,8 @@ def store(
     folder.mkdir(parents=True, exist_ok=True)
     if foreign.mesh is not None:
         _write_fields(folder / RESULT, foreign)
-        verdict = replace(verdict, result=RESULT, result_sha256=seal(folder / RESULT))
+        file = Files(result=RESULT, result_sha256=seal(folder / RESULT))
+        verdict = replace(verdict, files=file)
     if (rows := compared.pressures()) is not None:
         _write_pressures(folder / PRESSURE, rows)
     write_verdict(folder / VERDICT, verdict)
@@ -186,17 +189,15 @@ def without_foreign(
     """
     verdict = without_result(word, reason, case, (case.swapped, case.hexahedra, case.recovery))
     named = _named(verdict, code, version, settings or {})
-    return replace(named, seconds={} if seconds is None else {"total": seconds})
+    return replace(named, cost=Cost(seconds={} if seconds is None else {"total": seconds}))
 
 
 def _named(verdict: Verdict, code: str, version: str, settings: Mapping[str, str]) -> Verdict:
     """The verdict in the name of a code."""
     return replace(
         verdict,
-        job=f"{verdict.job}@{code}",
-        code=code,
-        code_version=version,
-        settings=dict(settings),
+        problem=replace(verdict.problem, job=f"{verdict.problem.job}@{code}"),
+        foreign=Foreign(code=code, code_version=version, settings=dict(settings)),
     )
 
 
@@ -216,32 +217,36 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
         less = [name for name in asked_for if name not in where or not where[name].whole]
         if less or not asked_for:
             why = _incomplete(where, less)
-            verdict = replace(verdict, verdict=PARTIAL, passed=False, judged="", reason=why)
+            verdict = replace(verdict, verdict=PARTIAL, judged="", reason=why)
     cause = compared.faults([check for check in checks if not check.passed])
     if cause and verdict.verdict == FAILED:
         verdict = replace(verdict, reason=f"{cause} ({verdict.reason})")
     named = _named(verdict, foreign.code, foreign.version, foreign.settings)
     return replace(
         named,
-        printed_digits=foreign.digits,
-        not_given=missing,
-        only=[name for name in wanted if name in only] if only and {*wanted} - {*only} else [],
-        compared={name: str(extent) for name, extent in where.items()},
         plan=[[name, "given; the case has no check of it"] for name in compared.unchecked(ran)],
-        pressure=compared.extremes("pressure"),
-        gap=compared.extremes("gap"),
-        stress=compared.extremes("normal_stress"),
-        status=None,
-        coverage=None,
-        dofs=None,
-        iterations=None,
-        linear_solver=None,
-        matrix_entries=None,
-        linear_iterations=None,
-        pressure_error_estimate=None,
-        seconds={} if foreign.seconds is None else {"total": foreign.seconds},
-        cpu_seconds=foreign.cpu_seconds,
-        peak_memory_mb=foreign.peak_memory_mb,
+        values=replace(
+            verdict.values,
+            pressure=compared.extremes("pressure"),
+            gap=compared.extremes("gap"),
+            stress=compared.extremes("normal_stress"),
+            status=None,
+            coverage=None,
+        ),
+        estimates=replace(verdict.estimates, pressure_error_estimate=None),
+        cost=Cost(
+            macro_elements=solution.cost.macro_elements,
+            seconds={} if foreign.seconds is None else {"total": foreign.seconds},
+            cpu_seconds=foreign.cpu_seconds,
+            peak_memory_mb=foreign.peak_memory_mb,
+        ),
+        foreign=replace(
+            named.foreign,
+            printed_digits=foreign.digits,
+            not_given=missing,
+            only=[name for name in wanted if name in only] if only and {*wanted} - {*only} else [],
+            compared={name: str(extent) for name, extent in where.items()},
+        ),
     )
 
 

@@ -112,7 +112,7 @@ def run_check_result(options: argparse.Namespace) -> int:
     from ..codes.files.read import read_result_files
     from ..codes.verdicts import check_foreign, folder_of, store
     from ..mesh import read_mesh
-    from ..verification.verdict import to_json
+    from ..verification.flat import to_json
 
     case = load_case(case_file(options.case)).as_solved(options.swap)
     only = _fields(options.only)

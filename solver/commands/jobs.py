@@ -89,7 +89,7 @@ class BatchJob:
 
     def read_verdict(self) -> Verdict | None:
         """Its verdict; None if it is missing or damaged."""
-        from ..verification.verdict import read_verdict
+        from ..verification.stored import read_verdict
 
         try:
             return read_verdict(self.verdict)
@@ -109,7 +109,7 @@ class BatchJob:
         Verdict or result are damaged, of another solve, or missing, or the machine ended the solve
         (memory, disk, a kill).
         """
-        from ..verification.verdict import unbound
+        from ..verification.stored import unbound
 
         if not Path(self.folder).is_dir():
             return False
@@ -124,7 +124,7 @@ class BatchJob:
         verdict = self.read_verdict()
         if verdict is None:
             return False
-        return verdict.provenance.get("inputs_sha256") != hash_of(self.inputs)
+        return verdict.files.provenance.get("inputs_sha256") != hash_of(self.inputs)
 
 
 def case_files(folder: Path) -> list[Path]:

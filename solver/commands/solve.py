@@ -118,8 +118,8 @@ def add_check(command: argparse.ArgumentParser) -> None:
 
 
 def run_check(options: argparse.Namespace) -> int:
+    from ..verification.flat import to_json
     from ..verification.run import check
-    from ..verification.verdict import to_json
 
     verdicts = [check(result) for result in options.results]
     if options.json:

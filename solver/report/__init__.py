@@ -45,8 +45,8 @@ def write_report(
         "summary.json": tables.to_json(rows),
         "summary.csv": tables.to_csv(rows),
         "summary.md": tables.to_markdown(rows),
-        "junit.xml": to_junit([row for row in rows if not row.verdict.code]),
-        "failures.txt": tables.to_failures([row for row in asked if not row.verdict.code]),
+        "junit.xml": to_junit([row for row in rows if not row.verdict.foreign.code]),
+        "failures.txt": tables.to_failures([row for row in asked if not row.verdict.foreign.code]),
     }
     contents |= {part.page: family_page(part, folder, parts) for part in parts}
     for name, content in contents.items():

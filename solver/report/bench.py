@@ -64,12 +64,12 @@ class Cell:
     @property
     def code(self) -> str:
         """The name of the column."""
-        return self.row.verdict.code or OURS
+        return self.row.verdict.foreign.code or OURS
 
     @property
     def recorded(self) -> bool:
         """Whether the figures are stated elsewhere, not computed here."""
-        return bool(self.row.verdict.recorded)
+        return bool(self.row.verdict.foreign.recorded)
 
     def _error(self, names: Iterable[str]) -> float | None:
         """The error of the first check, or norm, that exists."""
@@ -82,7 +82,7 @@ class Cell:
 
     def _digits(self, names: Iterable[str]) -> float | None:
         """The digits of these checks, no more than the result has."""
-        found, printed = digits(self._error(names)), self.row.verdict.printed_digits
+        found, printed = digits(self._error(names)), self.row.verdict.foreign.printed_digits
         return found if found is None or printed is None else min(found, printed)
 
     @property
@@ -123,19 +123,19 @@ class Cell:
         """The cell as a record for spreadsheets and programs."""
         verdict = self.row.verdict
         return {
-            "family": verdict.family,
+            "family": verdict.problem.family,
             "case": self.row.case,
             "code": self.code,
-            "version": verdict.code_version,
+            "version": verdict.foreign.code_version,
             "verdict": self.row.word,
             "pressure_digits": self.pressure,
             "stress_digits": self.stress,
             "pressure_error": self._error(PRESSURES),
             "stress_error": self._error(STRESSES),
             "seconds": self.seconds,
-            "cpu_seconds": verdict.cpu_seconds,
-            "peak_memory_mb": verdict.peak_memory_mb,
-            "recorded": verdict.recorded.get("source", ""),
+            "cpu_seconds": verdict.cost.cpu_seconds,
+            "peak_memory_mb": verdict.cost.peak_memory_mb,
+            "recorded": verdict.foreign.recorded.get("source", ""),
             "reason": self.row.why,
         }
 
@@ -175,7 +175,7 @@ class Bench:
         found = []
         for code in self.codes:
             of = [cells[code] for cells in self.cells.values() if code in cells]
-            settings = {k: v for cell in of for k, v in cell.row.verdict.settings.items()}
+            settings = {k: v for cell in of for k, v in cell.row.verdict.foreign.settings.items()}
             found.append((code, of[0], settings))
         return found
 
@@ -243,7 +243,7 @@ class Bench:
 def _pressures(row: Row) -> np.ndarray:
     """Place and pressure (k, dim + 1) that another code has; empty where they are not known."""
     file = row.folder / PRESSURE
-    if not row.verdict.code or row.verdict.recorded or not file.is_file():
+    if not row.verdict.foreign.code or row.verdict.foreign.recorded or not file.is_file():
         return np.empty((0, 3))
     return read_pressures(file)
 
@@ -296,12 +296,12 @@ def write_bench(rows: Sequence[Row], folder: Path, families: Iterable[Path] = ()
         Row(verdict, folder)
         for family in families
         for verdict in recorded_verdicts(family)
-        if (verdict.family, verdict.case) in there
+        if (verdict.problem.family, verdict.problem.case) in there
     ]
     bench = Bench([*rows, *recorded])
     if not bench.cells:
         return
-    computed = [row for row in rows if row.verdict.code]
+    computed = [row for row in rows if row.verdict.foreign.code]
     contents = {
         PAGE: to_html(bench),
         "bench.json": rows_to_json([c.row for of in bench.cells.values() for c in of.values()]),

@@ -148,7 +148,7 @@ def work_card(rows: Sequence[Row], left_out: LeftOut) -> WorkCard:
     found = left_out.values()
     counts = [sum(column) for column in zip(*(used for _, used, _ in found), strict=True)]
     saved = sum(time.saved for _, _, time in found if time)
-    spent = sum(row.verdict.cpu_seconds or 0.0 for row in ours(rows))
+    spent = sum(row.verdict.cost.cpu_seconds or 0.0 for row in ours(rows))
     kinds = dict(zip(WORK.values(), counts, strict=False))
     return WorkCard(saved, spent, kinds, sum(count for count, _, _ in found))
 
@@ -156,7 +156,7 @@ def work_card(rows: Sequence[Row], left_out: LeftOut) -> WorkCard:
 def left_out_by_family(rows: Sequence[Row], folder: Path) -> LeftOut:
     """What solves left out; the times are in `folder`, that of the report."""
     found: LeftOut = {}
-    solved = [row for row in ours(rows) if row.verdict.dofs]
+    solved = [row for row in ours(rows) if row.verdict.cost.dofs]
     for family, mine in families(solved).items():
         counts = [sum(switch in row.verdict.switches for row in mine) for switch in WORK]
         found[family] = len(mine), counts, read_savings(folder / "saved" / f"{family}.json")

@@ -65,7 +65,7 @@ def draw_case(solution: Solution, title: str) -> Markup:
         return drawing.svg()
     used = np.concatenate([p.points[p.used, :2] for p in drawn if p.meshed])
     box = pressed_box(solution.mesh.points, solution.zones, used)
-    if np.ptp(box, axis=0).max() >= _LARGE * solution.length:
+    if np.ptp(box, axis=0).max() >= _LARGE * solution.scalars.length:
         _whole(drawing, solution, drawn, _ALONE, drawing.width)
         return drawing.svg()
     whole = _whole(drawing, solution, drawn, _BESIDE, _CONTACT[0])
@@ -86,7 +86,7 @@ def _whole(
 ) -> View:
     """All bodies apart, with loads, supports, axes, and labels from the bodies to x = `end`."""
     dim, length = solution.mesh.points.shape[1], solution.case.units.get("length")
-    share = _APART[dim] * solution.length
+    share = _APART[dim] * solution.scalars.length
     screen = FLAT if dim == 2 else axonometry(mean_normal(solution))
     flat = [(p.points[p.used] + share * p.way) @ screen.T for p in drawn]
     axis = _axis(solution)

@@ -16,7 +16,8 @@ from typing import Any
 from ..case.checks import ROUND_OFF
 from ..system.errors import InputError, hint
 from ..system.files import write_text
-from ..verification.verdict import WORDS, CheckResult, Verdict, typed
+from ..verification.stored import typed_list
+from ..verification.verdict import WORDS, CheckResult
 from . import formats
 from .formats import TEMPLATES, render
 from .rows import Row, natural
@@ -48,7 +49,7 @@ class Batch:
     @property
     def origin(self) -> str:
         """Revision and machine, if the solves have them."""
-        found = [row.verdict.provenance for row in self.rows.values()]
+        found = [row.verdict.files.provenance for row in self.rows.values()]
         values = [sorted({str(o[k]) for o in found if o.get(k)}) for k in ("revision", "cpu")]
         return "; ".join(", ".join(each) for each in values if each)
 
@@ -151,7 +152,7 @@ class Comparison:
         told = []
         for rows in zip(*self._solved, strict=True):
             wall = formats.seconds(sum(row.total or 0.0 for row in rows))
-            processor = formats.seconds(sum(row.verdict.cpu_seconds or 0.0 for row in rows))
+            processor = formats.seconds(sum(row.verdict.cost.cpu_seconds or 0.0 for row in rows))
             told.append(f"wall time {wall}, processor time {processor}")
         return f"{len(self._solved)} solves in both: {', before; '.join(told)} now."
 
@@ -182,22 +183,22 @@ def read_batch(path: Path) -> Batch:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(file, "file", None, f"must be JSON ({error})") from None
-    verdicts = typed(list[Verdict], content, file)
-    rows = [Row(verdict, file.parent.parent / verdict.family) for verdict in verdicts]
+    verdicts = typed_list(content, file)
+    rows = [Row(verdict, file.parent.parent / verdict.problem.family) for verdict in verdicts]
     if not code:
         return Batch(file, {(row.group, row.name): row for row in rows})
-    mine = [row for row in rows if (row.verdict.code or OURS) == code]
+    mine = [row for row in rows if (row.verdict.foreign.code or OURS) == code]
     if not mine:
-        there = {row.verdict.code or OURS for row in rows}
+        there = {row.verdict.foreign.code or OURS for row in rows}
         raise InputError(path, "code", code, f"it has no result there; {hint(code, there)}")
     return Batch(file, {(row.group, row.case): row for row in mine})
 
 
 def _changes(base: Row, this: Row) -> Iterator[Change]:
     solve = this.anchor
-    alike = base.verdict.code == this.verdict.code
+    alike = base.verdict.foreign.code == this.verdict.foreign.code
     for key, name in _COUNTS.items() if alike else ():
-        before, now = getattr(base.verdict, key), getattr(this.verdict, key)
+        before, now = (getattr(row.verdict.cost, key) for row in (base, this))
         if before != now:
             yield Change(solve, name, _text(before), _text(now), None)
     checks = [{c.title: c for c in row.verdict.checks} for row in (base, this)]

@@ -43,7 +43,7 @@ _APART = 0.05
 def drawn(rows: Sequence[Row]) -> list[Row]:
     """The solves of our own that have both an error and a time."""
     known = (row for row in rows if row.accuracy is not None and row.total)
-    return [row for row in known if not row.verdict.code]
+    return [row for row in known if not row.verdict.foreign.code]
 
 
 def floor(rows: Sequence[Row]) -> tuple[float, float] | None:
@@ -54,7 +54,7 @@ def floor(rows: Sequence[Row]) -> tuple[float, float] | None:
 
 def unknowns(rows: Sequence[Row]) -> int:
     """The unknowns of the largest of these solves."""
-    return max((row.verdict.dofs or 1 for row in rows), default=1)
+    return max((row.verdict.cost.dofs or 1 for row in rows), default=1)
 
 
 def draw_errors(rows: Sequence[Row], reference_code: Sequence[CodeError]) -> Chart:

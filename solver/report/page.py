@@ -96,14 +96,16 @@ def error_chart(rows: Sequence[Row]) -> Chart | None:
 
 def digit_chart(rows: Sequence[Row]) -> Chart | None:
     """The digits that rounding leaves, as each solve estimates them, over its unknowns."""
-    known = [row for row in ours(rows) if row.verdict.attainable and row.verdict.dofs]
+    known = [
+        row for row in ours(rows) if row.verdict.estimates.attainable and row.verdict.cost.dofs
+    ]
     if not known:
         return None
     records: list[dict[str, Any]] = [
         {
             "series": _DIMENSIONS.get(row.dim, "other"),
             "case": row.name,
-            "unknowns": row.verdict.dofs,
+            "unknowns": row.verdict.cost.dofs,
             "digits": digits_kept(row),
             "cause": cause(row),
             "url": address(row),
@@ -129,7 +131,7 @@ def digit_chart(rows: Sequence[Row]) -> Chart | None:
 
 def digits_kept(row: Row) -> float:
     """How many decimal digits rounding leaves in the pressure, by the estimate of the solve."""
-    return _digits(row.verdict.attainable or 1.0)
+    return _digits(row.verdict.estimates.attainable or 1.0)
 
 
 def _digits(error: float) -> float:
@@ -138,13 +140,15 @@ def _digits(error: float) -> float:
 
 def cause(row: Row) -> str:
     """What costs a solve most of its digits."""
-    name, _ = max(row.verdict.accuracy.items(), key=lambda item: item[1], default=("", 0.0))
+    name, _ = max(
+        row.verdict.estimates.accuracy.items(), key=lambda item: item[1], default=("", 0.0)
+    )
     return CAUSES.get(name, name)
 
 
 def fewest_digits(rows: Sequence[Row]) -> list[Row]:
     """The ten solves that keep the fewest digits."""
-    known = [row for row in ours(rows) if row.verdict.attainable]
+    known = [row for row in ours(rows) if row.verdict.estimates.attainable]
     return sorted(known, key=lambda row: (digits_kept(row), row.anchor))[:_WORST]
 
 
@@ -249,7 +253,7 @@ def left_out(rows: Sequence[Row]) -> list[tuple[str, str, int]]:
 
 def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """When, where and with what the solves ran."""
-    origins = [row.verdict.provenance for row in rows if row.verdict.provenance]
+    origins = [row.verdict.files.provenance for row in rows if row.verdict.files.provenance]
     if not origins:
         return []
 
@@ -275,7 +279,7 @@ def _times(rows: Sequence[Row]) -> str:
 
 
 def _costs(row: Row) -> tuple[float | None, float | None]:
-    return row.total, row.verdict.cpu_seconds
+    return row.total, row.verdict.cost.cpu_seconds
 
 
 def _order(name: str) -> tuple[int, str]:

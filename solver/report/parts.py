@@ -98,8 +98,8 @@ def rigid_surface(
     if surface is None or not faces:
         return None
     points, own = solution.mesh.points, solution.body == number
-    if solution.motion is not None:
-        given = np.c_[points[own] - solution.motion[own], np.ones(own.sum())]
+    if solution.fields.motion is not None:
+        given = np.c_[points[own] - solution.fields.motion[own], np.ones(own.sum())]
         *turn, shift = np.linalg.lstsq(given, points[own], rcond=None)[0]
         surface = surface.moved(np.array(turn).T, shift)
     used = np.unique(np.concatenate([nodes.ravel() for _, nodes, _ in faces]))

@@ -70,9 +70,9 @@ def surfaces(solution: Solution, file: str) -> str:
             fields.setdefault(title, []).append(values)
     content = {
         "dim": dim,
-        "length": solution.length,
+        "length": solution.scalars.length,
         "eye": _eye(mean_normal(solution)),
-        "factor": magnification(solution.displacement, solution.length),
+        "factor": magnification(solution.displacement, solution.scalars.length),
         "whole": [whole.min(axis=0).tolist(), whole.max(axis=0).tolist()],
         "contact": _contact(solution),
         "steps": [step.factor for step in solution.steps] if solution.earlier else [],
@@ -169,7 +169,7 @@ def _nodal_fields(solution: Solution) -> Fields:
     units = solution.case.units
     found = {
         with_unit("displacement |u|", units.get("length")): size,
-        with_unit("normal stress σₙ", units.get("stress")): solution.nodal_normal_stress,
+        with_unit("normal stress σₙ", units.get("stress")): solution.fields.normal_stress,
     }
     nodes = np.flatnonzero(solution.deformable)
     for key, (title, sampler) in _ERRORS.items():

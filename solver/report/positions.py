@@ -15,7 +15,7 @@ _LOOKS = {"largest pressure": Look(BLUE), "normal force / area": Look(ORANGE, "s
 def positions(row: Row) -> Chart | str:
     """The chart of one solve's zones over its steps; empty where there are few."""
     records = []
-    for one in row.verdict.forces:
+    for one in row.verdict.values.forces:
         if not one.name.startswith(_ZONE) or not one.area or not one.pressure:
             continue
         normal = np.array(one.force) - np.array(one.friction or 0.0)
@@ -25,7 +25,7 @@ def positions(row: Row) -> Chart | str:
             records.append({"series": series, "step": one.step, "value": value, "zone": zone})
     if len({record["step"] for record in records}) < _FEWEST:
         return ""
-    unit = row.verdict.units.get("stress")
+    unit = row.verdict.problem.units.get("stress")
     return series_chart(
         f"positions-{row.name}",
         f"{row.name}: contact over the steps",

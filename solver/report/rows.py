@@ -11,6 +11,7 @@ from typing import Any
 
 from ..lac.cells.catalogue import BY_NAME
 from ..system.errors import InputError
+from ..verification.stored import read_verdict, unbound
 from ..verification.verdict import (
     CRASHED,
     NUMBERS,
@@ -18,9 +19,8 @@ from ..verification.verdict import (
     WORDS,
     Body,
     CheckResult,
+    Problem,
     Verdict,
-    read_verdict,
-    unbound,
 )
 
 # Checks of the contact pressure, the one on every macro-element first.
@@ -37,18 +37,18 @@ class Row:
     @property
     def name(self) -> str:
         """The name of the solve."""
-        return self.verdict.job
+        return self.verdict.problem.job
 
     @property
     def case(self) -> str:
         """The name of the solve without the code's name."""
-        code = self.verdict.code
+        code = self.verdict.foreign.code
         return self.name.removesuffix(f"@{code}") if code else self.name
 
     @property
     def group(self) -> str:
         """The family's name."""
-        return self.verdict.family
+        return self.verdict.problem.family
 
     @property
     def anchor(self) -> str:
@@ -81,13 +81,14 @@ class Row:
     @cached_property
     def stored(self) -> Path | None:
         """The file with the fields, if there is one."""
-        path = self.folder / self.verdict.result if self.verdict.result else None
+        name = self.verdict.files.result
+        path = self.folder / name if name else None
         return path if path and path.is_file() else None
 
     @property
     def result_file(self) -> Path | None:
         """The result of our own solver, from which pictures can be drawn."""
-        return None if self.verdict.code else self.stored
+        return None if self.verdict.foreign.code else self.stored
 
     def errors(self, names: Iterable[str]) -> list[tuple[float, str]]:
         """Errors of the checks of these names, largest first, with the checks' names."""
@@ -123,7 +124,7 @@ class Row:
     @cached_property
     def norms(self) -> Mapping[str, float]:
         """Errors against the exact solution by their names in `solver.verification.norms`."""
-        errors = self.verdict.errors.items()
+        errors = self.verdict.estimates.errors.items()
         return {name: value for name, value in errors if not math.isnan(value)}
 
     def origin(self, kinds: Mapping[str, str]) -> str:
@@ -139,7 +140,7 @@ class Row:
                 else f"{c.name} compared with {c.reference:g}"
                 for c in compared
             )
-        kind, code = self.verdict.reference_kind or "", self.verdict.reference_code
+        kind, code = self.verdict.reference.kind or "", self.verdict.reference.code
         named = f": {code.get('name')} {code.get('version')}" if code else ""
         return f"{kinds.get(kind, kind)}{named}"
 
@@ -156,12 +157,12 @@ class Row:
     @property
     def total(self) -> float | None:
         """Wall time of the solve, seconds."""
-        return self.verdict.seconds.get("total")
+        return self.verdict.cost.seconds.get("total")
 
     @property
     def stages(self) -> dict[str, float]:
         """Wall time by stage, seconds."""
-        seconds = self.verdict.seconds.items()
+        seconds = self.verdict.cost.seconds.items()
         return {stage: s for stage, s in seconds if stage != "total" and s}
 
     @property
@@ -172,7 +173,7 @@ class Row:
             "cells": sorted({name for body in self.sides for name in body.cells}),
             "verdict": [self.word],
             "judged": [self.verdict.judged.replace(" ", "_") or "none"],
-            "reference": [self.verdict.reference_kind or "none"],
+            "reference": [self.verdict.reference.kind or "none"],
         }
 
     @property
@@ -190,7 +191,7 @@ class Row:
     def sides(self) -> list[Body]:
         """The bodies, slave first."""
         order = {"slave": 0, "both": 1, "master": 2}
-        return sorted(self.verdict.bodies, key=lambda body: order.get(body.role, 3))
+        return sorted(self.verdict.problem.bodies, key=lambda body: order.get(body.role, 3))
 
 
 def read_rows(verdicts: Iterable[Path]) -> list[Row]:
@@ -205,7 +206,7 @@ def read_rows(verdicts: Iterable[Path]) -> list[Row]:
 
 def _place(row: Row) -> tuple[str, bool, int, list[tuple[int, int | str]]]:
     """Where a row is in the tables: ours before other codes'."""
-    return row.group, bool(row.verdict.code), WORDS.index(row.word), natural(row.name)
+    return row.group, bool(row.verdict.foreign.code), WORDS.index(row.word), natural(row.name)
 
 
 def natural(name: str) -> list[tuple[int, int | str]]:
@@ -224,12 +225,13 @@ def _read(path: Path) -> Verdict:
         return verdict
     *_, family, job = ("", "", *path.absolute().parts[:-1])
     reason = f"{fault}; solve again"
-    return Verdict(case=job, family=family, job=job, verdict=CRASHED, reason=reason, transient=True)
+    problem = Problem(case=job, family=family, job=job)
+    return Verdict(problem=problem, verdict=CRASHED, reason=reason, transient=True)
 
 
 def ours(rows: Sequence[Row]) -> list[Row]:
     """Our own solves; all solves without any of our own."""
-    return [row for row in rows if not row.verdict.code] or list(rows)
+    return [row for row in rows if not row.verdict.foreign.code] or list(rows)
 
 
 def choices(rows: Sequence[Row]) -> dict[str, list[str]]:

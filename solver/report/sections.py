@@ -67,18 +67,22 @@ class FamilySection:
 
     def is_one(self, name: str) -> bool:
         """Whether a quantity is one everywhere in all solves: its column would say nothing."""
-        known = [getattr(row.verdict, name) for row in self.rows]
+        known = [getattr(row.verdict.values, name) for row in self.rows]
         values = [x for pair in known for x in pair or () if x is not None]
         return bool(values) and all(abs(x - 1) < formats.ROUND_OFF for x in values)
 
     def unit(self, kind: str) -> str:
         """The unit of a kind of quantity, if all solves have the same."""
-        found = {row.verdict.units.get(kind, "") for row in ours(self.rows) if row.verdict.dofs}
+        found = {
+            row.verdict.problem.units.get(kind, "")
+            for row in ours(self.rows)
+            if row.verdict.cost.dofs
+        }
         return found.pop() if len(found) == 1 else ""
 
     def own_unit(self, row: Row, kind: str) -> str:
         """The unit that a row's numbers have beside them, where the head of the table has none."""
-        return "" if self.unit(kind) else row.verdict.units.get(kind, "")
+        return "" if self.unit(kind) else row.verdict.problem.units.get(kind, "")
 
     def code_error(self, row: Row) -> CodeError | None:
         """What the first version of the reference code has in a solve: the largest that applies."""
@@ -97,7 +101,7 @@ class FamilySection:
     @property
     def cpu(self) -> float:
         """Processor time of all solves, seconds, without the start of Python."""
-        return sum(row.verdict.cpu_seconds or 0.0 for row in self.rows)
+        return sum(row.verdict.cost.cpu_seconds or 0.0 for row in self.rows)
 
     @property
     def worst(self) -> tuple[float, str] | None:
@@ -109,7 +113,7 @@ class FamilySection:
         """Rows by where their reference comes from, in words."""
         found: dict[str, list[Row]] = {}
         for row in self.rows:
-            other = "; results of other codes" if row.verdict.code else ""
+            other = "; results of other codes" if row.verdict.foreign.code else ""
             found.setdefault(f"{row.origin(KINDS)}{other}", []).append(row)
         return found
 
@@ -119,10 +123,10 @@ class FamilySection:
         found: dict[tuple[str, str, str, float | None], list[Row]] = {}
         for row in ours(self.rows):
             key = (
-                row.verdict.reference_kind or "",
+                row.verdict.reference.kind or "",
                 row.origin(KINDS),
-                row.verdict.reference_solution or "",
-                row.verdict.reference_uncertainty,
+                row.verdict.reference.solution or "",
+                row.verdict.reference.uncertainty,
             )
             found.setdefault(key, []).append(row)
         return found

@@ -55,7 +55,7 @@ class Symbols:
         return list(labels.values())
 
     def _nodes(self, key: str) -> np.ndarray:
-        return self.solution.acted.get(key, np.empty(0, int))
+        return self.solution.places.acted.get(key, np.empty(0, int))
 
     def _outward(self, nodes: np.ndarray) -> np.ndarray:
         """The normals (n, 3) of the faces of a group; where it has none, of all faces."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
-from ..verification.verdict import to_json as strict_json
+from ..verification.flat import to_json as strict_json
 from . import formats
 from .rows import Row, counted, families, ours
 
@@ -61,22 +61,22 @@ def _record(row: Row, stages: Sequence[str], checks: Sequence[str]) -> dict[str,
     record: dict[str, Any] = {
         "family": row.group,
         "job": row.name,
-        "case": row.verdict.case,
-        "direction": row.verdict.direction,
-        "variant": row.verdict.variant,
+        "case": row.verdict.problem.case,
+        "direction": row.verdict.problem.direction,
+        "variant": row.verdict.problem.variant,
         "verdict": row.word,
         "judged": row.verdict.judged,
         "reason": row.why,
-        "reference_kind": row.verdict.reference_kind,
+        "reference_kind": row.verdict.reference.kind,
         "slave": row.slave,
     }
     for key in ("cells", "reference_cells", "faces", "reference_faces"):
         for role in ("slave", "master"):
             bodies = [body for body in row.sides if body.role == role]
             record[f"{role}_{key}"] = "; ".join(_plain(getattr(body, key)) for body in bodies)
-    record |= {"dofs": row.verdict.dofs, "macro_elements": row.verdict.macro_elements}
+    record |= {"dofs": row.verdict.cost.dofs, "macro_elements": row.verdict.cost.macro_elements}
     for key in ("pressure", "stress", "gap", "status", "coverage"):
-        pair = getattr(row.verdict, key) or (None, None)
+        pair = getattr(row.verdict.values, key) or (None, None)
         record |= {f"{key}_minimum": pair[0], f"{key}_maximum": pair[1]}
     worst = row.accuracy or (None, None)
     record |= {"worst_error": worst[0], "worst_check": worst[1]}
@@ -84,10 +84,10 @@ def _record(row: Row, stages: Sequence[str], checks: Sequence[str]) -> dict[str,
         record[f"error_{check}"] = next((e for e, _ in row.errors([check])), None)
     for stage in stages:
         record[f"seconds_{stage}"] = row.stages.get(stage)
-    record |= {"seconds_total": row.total, "cpu_seconds": row.verdict.cpu_seconds}
+    record |= {"seconds_total": row.total, "cpu_seconds": row.verdict.cost.cpu_seconds}
     return record | {
-        "peak_memory_mb": row.verdict.peak_memory_mb,
-        "linear_solver": row.verdict.linear_solver,
+        "peak_memory_mb": row.verdict.cost.peak_memory_mb,
+        "linear_solver": row.verdict.cost.linear_solver,
     }
 
 
@@ -118,20 +118,20 @@ def _cells(row: Row) -> list[str]:
     return [
         row.name,
         row.word,
-        row.verdict.reference_kind or formats.NOTHING,
+        row.verdict.reference.kind or formats.NOTHING,
         " on ".join(formats.types(body) for body in sides) or formats.NOTHING,
         row.slave or formats.NOTHING,
         ", ".join(
             formats.against(sum(body.cells.values()), body.reference_cells) for body in sides
         ),
         ", ".join(formats.against(body.faces, body.reference_faces) for body in sides),
-        str(row.verdict.dofs or formats.NOTHING),
-        str(row.verdict.macro_elements or formats.NOTHING),
-        formats.extremes(row.verdict.pressure),
-        formats.extremes(row.verdict.stress),
-        formats.extremes(row.verdict.gap, row.verdict.length),
-        formats.extremes(row.verdict.status),
-        formats.extremes(row.verdict.coverage),
+        str(row.verdict.cost.dofs or formats.NOTHING),
+        str(row.verdict.cost.macro_elements or formats.NOTHING),
+        formats.extremes(row.verdict.values.pressure),
+        formats.extremes(row.verdict.values.stress),
+        formats.extremes(row.verdict.values.gap, row.verdict.values.length),
+        formats.extremes(row.verdict.values.status),
+        formats.extremes(row.verdict.values.coverage),
         f"{formats.error(worst[0])} ({worst[1]})" if worst else formats.NOTHING,
         formats.seconds(row.total),
         row.why,
@@ -149,7 +149,7 @@ def to_failures(rows: Sequence[Row]) -> str:
 
     Other codes are shown in the tables; they do not fail the batch.
     """
-    bad = (row for row in rows if not row.sound and not row.verdict.code)
+    bad = (row for row in rows if not row.sound and not row.verdict.foreign.code)
     return "".join(f"{row.name}: {row.word}: {row.why}\n" for row in bad)
 
 
@@ -163,7 +163,7 @@ def outcome(rows: Sequence[Row]) -> str:
         said = f"All {len(mine)} solves passed." if len(mine) > 1 else "The one solve passed."
     if not others:
         return said
-    good = sum(row.sound for row in rows if row.verdict.code)
+    good = sum(row.sound for row in rows if row.verdict.foreign.code)
     return f"{said} Of {others} results of other codes {good} passed."
 
 
@@ -203,7 +203,7 @@ def _case(row: Row) -> TestCase:
 
 def _started(rows: Sequence[Row]) -> str:
     """When the first of the solves ended, in UTC as the schema wants it; now if unknown."""
-    times = [str(time) for row in rows if (time := row.verdict.provenance.get("time_utc"))]
+    times = [str(time) for row in rows if (time := row.verdict.files.provenance.get("time_utc"))]
     return min(times, default=datetime.now(UTC).isoformat())[:19]
 
 
@@ -212,7 +212,7 @@ def _properties(rows: Sequence[Row]) -> dict[str, str]:
     verdicts = ", ".join(f"{n} {word}" for word, n in counted(rows).items())
     found = {"verdicts": verdicts}
     for key in _PROPERTIES:
-        values = sorted({str(v) for row in rows if (v := row.verdict.provenance.get(key))})
+        values = sorted({str(v) for row in rows if (v := row.verdict.files.provenance.get(key))})
         if values:
             found[key] = ", ".join(values)
     return found

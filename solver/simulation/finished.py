@@ -32,12 +32,16 @@ def finished(solution: Solution, clock: Clock, ended: str) -> Solution:
     `ended`: why the step after its last one has no solution; empty where all have one.
     """
     _log_forces(solution)
-    solution.plan += [*estimated(solution), *remarks(solution.validity), *softness_notes(solution)]
-    solution.seconds, solution.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
+    solution.plan += [
+        *estimated(solution),
+        *remarks(solution.quality.validity),
+        *softness_notes(solution),
+    ]
+    solution.cost.seconds, solution.cost.stage_cpu_seconds = clock.seconds, clock.cpu_seconds
     solution.ended = ended
     if fault := inconsistency(solution):
         raise SolveError(f"the solve came to no sound end: {fault}")
-    solution.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
+    solution.cost.peak_memory_mb = peak_mb(resource.getrusage(resource.RUSAGE_SELF))
     return solution
 
 
@@ -69,13 +73,13 @@ def _log_forces(solution: Solution) -> None:
         for body in step.rigid:
             text = "%scontact on rigid body %s: %s"
             _LOG.log(OUTCOME, text, of_step, body.body, shown(most, body))
-    for name, probe in solution.probes.items():
+    for name, probe in solution.places.probes.items():
         for line in probe.lines():
             _LOG.log(OUTCOME, "probe %s %s", name, line)
     largest, place = solution.largest_displacement
     at = ", ".join(f"{x:.5g}" for x in place)
-    beside = " beside the motion" if solution.motion is not None else ""
-    values = beside, largest, at, solution.validity.strain, solution.strain_energy
+    beside = " beside the motion" if solution.fields.motion is not None else ""
+    values = beside, largest, at, solution.quality.validity.strain, solution.scalars.strain_energy
     text = "largest displacement%s %.6g at (%s), largest strain %.3g, strain energy %.6g"
     _LOG.log(OUTCOME, text, *values)
 

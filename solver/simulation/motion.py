@@ -8,7 +8,7 @@ at the end of the last step. Strains are small, and neglected in the geometry.
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import meshio
 import numpy as np
@@ -30,8 +30,9 @@ from .judgement.validity import NOTED_SLIP, validity
 from .options import Options
 from .results.fields import grid_fields
 from .results.forces import RigidMotion
+from .results.records import Validity
 from .results.results import solution_of
-from .results.solution import Line, Position, Solution, Validity
+from .results.solution import Line, Position, Solution
 from .scene.attributes import Attributes
 from .scene.bodies import body_names
 from .scene.moved import Frames, Moved, predicted, rotation_vector, settled
@@ -172,23 +173,23 @@ def _solution(
     state, groups = place.state, place.groups
     plan = [*decided(problem), *plan_notes(problem, [state], len(before) + 1)]
     found = solution_of(problem, [state], [solved.field], plan)
-    found.validity = validity(problem, [state])
-    found.motion = groups.motion
+    found.quality.validity = validity(problem, [state])
+    found.fields.motion = groups.motion
     (step,) = found.steps
     step.factor = factor
     step.rigid = [_whole_motion(groups, rigid) for rigid in step.rigid]
-    force, path = state.force + found.reaction, place.displacement
+    force, path = state.force + found.fields.reaction, place.displacement
     if last is not None:
-        force = force + last.state.force + before[-1].reaction
+        force = force + last.state.force + before[-1].fields.reaction
         path = path - last.displacement
         for zone, old in zip(found.zones, before[-1].zones, strict=True):
             if zone.friction and old.friction:
                 turned = _turned(problem.scene, zone.name, old.friction.slip_total, groups, last)
                 zone.friction.slip_total = zone.friction.slip + turned
     step.work = float((force * path).sum() / 2)
-    for name, probe in found.probes.items():
+    for name, probe in found.places.probes.items():
         moved = place.displacement[problem.scene.probed[name]]
-        found.probes[name] = replace(probe, displacement=moved)
+        found.places.probes[name] = replace(probe, displacement=moved)
     return found
 
 
@@ -217,20 +218,19 @@ def _turned(scene: Scene, name: str, slips: np.ndarray, groups: Moved, last: _Pl
 def _joined(case: Case, found: Sequence[Solution]) -> Solution:
     """The last solution, with the steps of all, and the positions before it."""
     last = found[-1]
-    largest = {
-        field.name: max(getattr(one.validity, field.name) for one in found)
-        for field in fields(Validity)
-    }
-    scale = max(one.load_scale for one in found)
+    quality = [one.quality for one in found]
     return replace(
         last,
         case=case,
         steps=[one.steps[0] for one in found],
-        load_scale=scale,
-        iterations=sum(one.iterations for one in found),
-        validity=Validity(**largest),
-        balance=_largest([one.balance for one in found]),
-        accuracy=_largest([one.accuracy for one in found]),
+        scalars=replace(last.scalars, load_scale=max(one.scalars.load_scale for one in found)),
+        cost=replace(last.cost, iterations=sum(one.cost.iterations or 0 for one in found)),
+        quality=replace(
+            last.quality,
+            balance=_largest([one.balance for one in quality]),
+            accuracy=_largest([one.accuracy for one in quality]),
+            validity=Validity.worst([one.validity for one in quality]),
+        ),
         earlier=[Position(one.mesh.points, *grid_fields(one)) for one in found[:-1]],
     )
 

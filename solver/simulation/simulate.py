@@ -40,7 +40,7 @@ def simulate(
     solution = solved(case, mesh, options, clock)
     if solution.ended:
         raise SolveError(solution.ended)
-    solution.cpu_seconds = processor_time() - started
+    solution.cost.cpu_seconds = processor_time() - started
     return solution
 
 
@@ -86,7 +86,7 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
         solution = solution_of(problem, states, fields, plan)
-        solution.validity = validity(problem, states)
+        solution.quality.validity = validity(problem, states)
     return finished(solution, clock, ended)
 
 

@@ -273,9 +273,9 @@ def _measured(point: Point, safeguards: Safeguards) -> Record:
     scene = build_scene(case, mesh, Options(safeguards=safeguards), clock)
     problem = ContactProblem(scene)
     solution = solve_problem(problem, clock)
-    zones, balance = solution.zones, solution.balance
+    zones, balance = solution.zones, solution.quality.balance
     # Of rounding alone: a sweep's points may have strains that no real body has.
-    accuracy = Accuracy(solution.accuracy)
+    accuracy = Accuracy(solution.quality.accuracy)
     measures: Record = {
         "word": UNRELIABLE if accuracy.reason else PASSED,
         "reason": accuracy.reason,
@@ -285,8 +285,8 @@ def _measured(point: Point, safeguards: Safeguards) -> Record:
         "force": max(v for k, v in balance.items() if k.endswith("force")),
         "moment": max(v for k, v in balance.items() if k.endswith("moment")),
         "residual": solution.steps[-1].residual,
-        "iterations": solution.iterations,
-        "dofs": solution.dofs,
+        "iterations": solution.cost.iterations,
+        "dofs": solution.cost.dofs,
         "attainable": accuracy.estimate,
     }
     if safeguards == Safeguards():

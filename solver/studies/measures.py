@@ -45,7 +45,8 @@ from ..system.process import available, run_in_subprocess, used_since
 from ..system.progress import SOLVING, Clock
 from ..verification.norms import errors
 from ..verification.run import mesh_of
-from ..verification.verdict import CRASHED, REFUSED, read_verdict
+from ..verification.stored import read_verdict
+from ..verification.verdict import CRASHED, REFUSED
 from . import digits
 from .description import Run
 from .points import Point
@@ -117,11 +118,11 @@ def _solved(solution: Solution) -> Record:
     slaves = [body for body in solution.bodies if body.role in ("slave", "both")]
     return {
         "dim": solution.mesh.points.shape[1],
-        "dofs": solution.dofs,
-        "macro_elements": solution.macro_elements,
-        "iterations": solution.iterations,
-        "linear_solver": solution.linear_solver,
-        "linear_iterations": solution.linear_iterations,
+        "dofs": solution.cost.dofs,
+        "macro_elements": solution.cost.macro_elements,
+        "iterations": solution.cost.iterations,
+        "linear_solver": solution.cost.linear_solver,
+        "linear_iterations": solution.cost.linear_iterations,
         "errors": errors(solution),
         "pressure_error_estimate": solution.pressure_error_estimate,
         "slave": list(dict.fromkeys(cells for body in slaves for cells in body.cells)),
@@ -179,11 +180,12 @@ def process(point: Point, cores: Sequence[int], limit: float) -> Record:
         if not verdict.is_file():
             return record | ended("failed" if done.status is None else "crashed", done.reason)
         content = read_verdict(verdict)
-    if content.dofs is None:
+    if content.cost.dofs is None:
         word = content.verdict if content.verdict in (REFUSED, CRASHED) else "failed"
         return record | ended(word, content.reason.removeprefix(f"{case}: "))
-    record |= {key: getattr(content, key) for key in _FROM_VERDICT}
-    faces = sum(body.faces for body in content.bodies)
+    plain = content.plain()
+    record |= {key: plain[key] for key in _FROM_VERDICT}
+    faces = sum(body.faces for body in content.problem.bodies)
     return record | {"verdict": content.verdict, "reason": content.reason, "faces": faces}
 
 
@@ -239,10 +241,10 @@ def results(point: Point) -> Record:
     solution = simulate(point.case, mesh_of(point.case))
     return {
         "job": solution.job,
-        "dofs": solution.dofs,
+        "dofs": solution.cost.dofs,
         "quantities": [asdict(one) for one in quantities(solution)],
         "pressure_error_estimate": solution.pressure_error_estimate,
-        "facet_depth": solution.validity.facet_depth,
+        "facet_depth": solution.quality.validity.facet_depth,
     }
 
 

@@ -48,9 +48,9 @@ def quantities(solution: Solution) -> list[Quantity]:
     found = [quantity for zone in solution.zones for quantity in _contact(solution, zone, degree)]
     largest = solution.largest_displacement[0]
     found.append(Quantity("largest displacement", largest, _displacement(solution), degree + 1))
-    if solution.strain_energy is not None:
+    if solution.scalars.strain_energy is not None:
         known = _given(solution, "strain_energy", _energy(solution))
-        found.append(Quantity("strain energy", solution.strain_energy, known, 2 * degree))
+        found.append(Quantity("strain energy", solution.scalars.strain_energy, known, 2 * degree))
     return found
 
 

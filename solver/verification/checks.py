@@ -53,16 +53,16 @@ def load(solution: Solution) -> float:
     If bodies only move, the stress itself is round-off.
     """
     if solution.case.loads:
-        return float(solution.load_scale)
+        return float(solution.scalars.load_scale)
     stiffness = min(m.young for m in solution.case.materials.values())
     moved = float(np.abs(solution.displacement).max(initial=0.0))
-    return max(float(solution.load_scale), stiffness * moved / solution.length)
+    return max(float(solution.scalars.load_scale), stiffness * moved / solution.scalars.length)
 
 
 def elongation(solution: Solution) -> float:
     """Load / stiffness × size."""
     stiffness = min(m.young for m in solution.case.materials.values())
-    return float(solution.load_scale / stiffness * block_size(solution))
+    return float(solution.scalars.load_scale / stiffness * block_size(solution))
 
 
 def total_force(solution: Solution) -> float:

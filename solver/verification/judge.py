@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,9 +27,14 @@ from .verdict import (
     Body,
     CheckError,
     CheckResult,
+    Estimates,
+    Files,
     Force,
+    Origin,
     Probed,
+    Problem,
     Sides,
+    Values,
     Verdict,
 )
 
@@ -57,19 +62,6 @@ ACCURACY = (
     "covered_pressure",
 )
 _ROUND_OFF = 1e-10
-# Fields that a verdict copies from a solution.
-_OF_SOLUTION = (
-    *("dofs", "macro_elements", "iterations", "linear_solver", "linear_iterations"),
-    *(
-        "matrix_entries",
-        "length",
-        "load_scale",
-        "strain_energy",
-        "stage_cpu_seconds",
-        "cpu_seconds",
-    ),
-    *("peak_memory_mb", "accuracy", "errors", "pressure_error_estimate"),
-)
 
 
 def judge(
@@ -88,48 +80,68 @@ def judge(
     where a step has no solution. `result`
     is the name of the result file beside the verdict and `sha256` its hash.
     """
-    accuracy, scatters = Accuracy(solution.accuracy), unresolved(solution)
+    accuracy, scatters = Accuracy(solution.quality.accuracy), unresolved(solution)
     unreliable = [reason for reason in (accuracy.reason, scatters) if reason]
-    unreliable += limits_passed(solution.case, solution.validity)
+    unreliable += limits_passed(solution.case, solution.quality.validity)
     reasons = unreliable + [_explained(check, accuracy) for check in checks if not check.passed]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
         word = UNRELIABLE if unreliable else FAILED
     if solution.ended:
         word, reasons = FAILED, [f"{solution.ended}; the steps before it are kept", *reasons]
-    seconds, zones, case = solution.seconds, solution.zones, solution.case
-    # In 3D, and on the full circle, forces are whole ones.
-    spatial = solution.mesh.points.shape[1] == 3 or case.axisymmetric
-    unverified = NOT_JUDGED if case.reference_kind and not case.reference else NOT_VERIFIED
+    unverified = NOT_VERIFIED
+    if solution.case.reference_kind and not solution.case.reference:
+        unverified = NOT_JUDGED
+    seconds = solution.cost.seconds
+    total = seconds.get("total", sum(seconds.values()))
+    problem, origin = _identity(solution.case, _solved_as(solution.case))
     return Verdict(
-        **_identity(solution.case, (solution.swapped, solution.hexahedra, solution.case.recovery)),
+        problem=replace(problem, bodies=_bodies(solution), units=_units(solution)),
         verdict=word,
-        passed=word == PASSED,
         judged=_judged(checks) if word == PASSED else "",
         reason=_first_of(reasons) or (unverified if word == SOLVED else ""),
-        result=result,
-        result_sha256=sha256,
-        **{name: getattr(solution, name) for name in _OF_SOLUTION},
-        **asdict(solution.validity),
-        pressure_within=None if scatters else _pressure_within(solution),
-        seconds={**seconds, "total": seconds.get("total", sum(seconds.values()))},
+        worst=_worst(checks),
+        closest_to_tolerance=_closest(checks),
+        checks=list(checks),
+        plan=[list(entry) for entry in solution.plan],
+        values=_values(solution),
+        estimates=Estimates(
+            accuracy=solution.quality.accuracy,
+            attainable=accuracy.estimate,
+            pressure_error_estimate=solution.pressure_error_estimate,
+            pressure_within=None if scatters else _pressure_within(solution),
+            errors=solution.quality.errors,
+            validity=solution.quality.validity,
+        ),
+        reference=origin,
+        cost=replace(solution.cost, seconds={**seconds, "total": total}),
+        files=Files(result=result, result_sha256=sha256, provenance=dict(provenance or {})),
+    )
+
+
+def _solved_as(case: Case) -> SolvedAs:
+    return case.swapped, case.hexahedra, case.recovery
+
+
+def _units(solution: Solution) -> dict[str, str]:
+    """In 3D, and on the full circle, forces are whole ones."""
+    spatial = solution.mesh.points.shape[1] == 3 or solution.case.axisymmetric
+    return derived(solution.case.units, spatial)
+
+
+def _values(solution: Solution) -> Values:
+    zones = solution.zones
+    return Values(
+        **vars(solution.scalars),
+        largest_displacement=solution.largest_displacement[0],
         pressure=_extremes(_where_covered(zone) for zone in zones),
-        stress=_extremes([solution.nodal_normal_stress[solution.body >= 0]]),
+        stress=_extremes([solution.fields.normal_stress[solution.body >= 0]]),
         gap=_extremes(zone.gap for zone in zones),
         status=_extremes(zone.closed.astype(int) for zone in zones),
         coverage=_extremes(zone.coverage for zone in zones),
-        worst=_worst(checks),
-        closest_to_tolerance=_closest(checks),
-        bodies=_bodies(solution),
-        plan=[list(entry) for entry in solution.plan],
-        checks=list(checks),
-        units=derived(solution.case.units, spatial),
         forces=list(_forces(solution)),
-        dissipation=[step.dissipation for step in solution.steps] if case.frictional else [],
-        probes=list(_probes(solution)) if solution.probes else [],
-        largest_displacement=solution.largest_displacement[0],
-        attainable=accuracy.estimate,
-        provenance=dict(provenance or {}),
+        dissipation=[s.dissipation for s in solution.steps] if solution.case.frictional else [],
+        probes=list(_probes(solution)) if solution.places.probes else [],
     )
 
 
@@ -138,7 +150,7 @@ def _pressure_within(solution: Solution) -> float | None:
 
     None where facets break the pressure, and for multipliers at nodes, which have no estimate.
     """
-    estimate, found = solution.pressure_error_estimate, solution.validity
+    estimate, found = solution.pressure_error_estimate, solution.quality.validity
     if estimate is None or broken_by_facets(solution.case, found):
         return None
     return math.hypot(estimate, found.facets)
@@ -157,34 +169,44 @@ def without_result(
     `case` is the path of the case file where the file itself could not be read; `solved_as` are the
     arguments of `Case.as_solved`, `provenance` what is known of its inputs.
     """
-    about = _identity(case, solved_as)
-    given = dict(provenance or {})
-    return Verdict(**about, verdict=word, reason=reason, transient=transient, provenance=given)
+    problem, origin = _identity(case, solved_as)
+    return Verdict(
+        problem=problem,
+        verdict=word,
+        reason=reason,
+        transient=transient,
+        reference=origin,
+        files=Files(provenance=dict(provenance or {})),
+    )
 
 
-def _identity(case: Case | Path, solved_as: SolvedAs) -> dict[str, Any]:
-    """The identity of a solve, and the origin of its reference."""
+def _identity(case: Case | Path, solved_as: SolvedAs) -> tuple[Problem, Origin]:
+    """What was solved, as far as that is known, and the origin of its reference."""
     swapped, hexahedra, recovery = solved_as
-    found: dict[str, Any] = {
-        "swapped": swapped,
-        "direction": "swapped" if swapped else "first",
-        "variant": hexahedra or "",
-        "recovery": recovery or "",
-    }
-    if isinstance(case, Path):
-        name, family = case.stem, case.parent.resolve().name
-    else:
-        name, family = case.name, case.family
-        found |= {
-            "title": case.title,
-            "zones": [Sides(name=z.name, slave=z.slave, master=z.master) for z in case.zones],
-            "reference_kind": case.reference_kind,
-            "reference_uncertainty": case.reference_uncertainty,
-            "reference_code": case.reference_code,
-            "reference_remark": case.reference_remark,
-            "reference_solution": case.solution.name if case.solution else None,
-        }
-    return found | {"case": name, "family": family, "job": job_name(name, *solved_as)}
+    read = None if isinstance(case, Path) else case
+    name = case.stem if isinstance(case, Path) else case.name
+    problem = Problem(
+        case=name,
+        family=case.parent.resolve().name if isinstance(case, Path) else case.family,
+        title=read.title if read else "",
+        job=job_name(name, *solved_as),
+        swapped=swapped,
+        direction="swapped" if swapped else "first",
+        variant=hexahedra or "",
+        recovery=recovery or "",
+        zones=[Sides(name=z.name, slave=z.slave, master=z.master) for z in read.zones]
+        if read
+        else [],
+    )
+    if read is None:
+        return problem, Origin()
+    return problem, Origin(
+        kind=read.reference_kind,
+        uncertainty=read.reference_uncertainty,
+        code=read.reference_code,
+        remark=read.reference_remark,
+        solution=read.solution.name if read.solution else None,
+    )
 
 
 def _judged(checks: Iterable[CheckResult]) -> str:
@@ -223,7 +245,7 @@ def _forces(solution: Solution) -> Iterator[Force]:
 
 def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:
     """The values at each probe, at `most` places of each."""
-    for name, probe in solution.probes.items():
+    for name, probe in solution.places.probes.items():
         for place, *values in zip(*(array[:most] for array in vars(probe).values()), strict=True):
             keys = [key for key in vars(probe) if key != "place"]
             given = zip(keys, values, strict=True)

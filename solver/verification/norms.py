@@ -108,7 +108,7 @@ def _squares_in(
     """The integrals over the `chosen` cells of a block, with the `parts` (n_points,) of nodes."""
     points, kind, (reference, weights) = solution.mesh.points, cell_type(block.type), rule
     values = shape_functions(kind.name).values(reference)
-    cells, mixed = block.data[chosen], solution.mean_stress.get(kind.name)
+    cells, mixed = block.data[chosen], solution.fields.mean_stress.get(kind.name)
     part, place = parts[cells[:, 0]], (values @ points[cells]).reshape(-1, kind.dim)
     at = np.repeat(part, len(weights))
     u, gradient = exact.displacement(place, at), exact.gradient(place, at)

@@ -66,7 +66,7 @@ def probed(quantity: str) -> Sampler:
     def sample(solution: Solution, _: None, reference: Reference) -> Sample | None:
         found = []
         for name, expected in reference.items():
-            if (probe := solution.probes.get(name)) is None:
+            if (probe := solution.places.probes.get(name)) is None:
                 return None
             values = getattr(probe, quantity).reshape(len(probe.place), -1)
             names = COMPONENTS if quantity == "stress" else ("x", "y", "z")
@@ -89,9 +89,9 @@ def _components(quantity: str, expected: Any) -> dict[str, Any]:
 
 def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample | None:
     """The strain energy of all bodies together."""
-    if solution.strain_energy is None:
+    if solution.scalars.strain_energy is None:
         return None
-    found = np.array([solution.strain_energy])
+    found = np.array([solution.scalars.strain_energy])
     return Sample(found, np.array([reference]), lambda _: "the whole solve")
 
 

@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,8 @@ from ..mesh.files.vtkhdf import (
 )
 from ..simulation.judgement.consistency import inconsistency
 from ..simulation.results.fields import grid_fields, grid_of
-from ..simulation.results.solution import BodyInfo, Line, Position, Solution, Validity
+from ..simulation.results.records import Cost, Fields, Places, Quality, Scalars, Validity
+from ..simulation.results.solution import BodyInfo, Line, Position, Solution
 from ..system.errors import InputError
 from ..system.files import replacing, seal, seal_of
 from .steps import read_probes, read_steps, read_zone, write_probes, write_steps, write_zone
@@ -63,19 +64,7 @@ from .units import label_fields
 from .verdict import CheckResult
 
 GRID = "VTKHDF"
-_SCALARS = (
-    "length",
-    "load_scale",
-    "dofs",
-    "macro_elements",
-    "iterations",
-    "linear_solver",
-    "linear_iterations",
-    "matrix_entries",
-    "cpu_seconds",
-    "peak_memory_mb",
-    "ended",
-)
+_VECTORS = "reaction", "motion"
 
 
 @dataclass
@@ -110,27 +99,29 @@ def _write(
 ) -> None:
     _write_grid(file.create_group(GRID), solution)
     _write_case(file.create_group("case"), solution)
-    file.create_group("solve").attrs.update({k: getattr(solution, k) for k in _SCALARS})
-    if solution.strain_energy is not None:
-        file["solve"].attrs["strain_energy"] = solution.strain_energy
+    given = vars(solution.scalars) | vars(solution.cost) | {"ended": solution.ended}
+    scalars = {k: v for k, v in given.items() if v is not None and not isinstance(v, dict)}
+    file.create_group("solve").attrs.update(scalars)
     probes = file.create_group("probes")
-    if solution.probes:
-        write_probes(probes, solution.probes)
+    if solution.places.probes:
+        write_probes(probes, solution.places.probes)
     acted = file.create_group("acted")
-    for key, nodes in solution.acted.items():
+    for key, nodes in solution.places.acted.items():
         acted[key] = nodes.astype(np.int32)
-    file.create_group("accuracy").attrs.update(solution.accuracy)
-    file.create_group("validity").attrs.update(asdict(solution.validity))
-    file.create_group("errors").attrs.update(solution.errors)
+    file.create_group("accuracy").attrs.update(solution.quality.accuracy)
+    file.create_group("validity").attrs.update(asdict(solution.quality.validity))
+    file.create_group("errors").attrs.update(solution.quality.errors)
     mean_stress = file.create_group("mean_stress")
-    for kind, values in solution.mean_stress.items():
+    for kind, values in solution.fields.mean_stress.items():
         mean_stress[kind] = values
     contact = file.create_group("contact")
     for number, zone in enumerate(solution.zones):
         write_zone(contact.create_group(zone.name), zone, number)
     _write_bodies(file.create_group("bodies"), solution.bodies)
     write_steps(file, solution.steps)
-    write_table(file.create_group("balance"), _pairs("name", "value", solution.balance.items()))
+    write_table(
+        file.create_group("balance"), _pairs("name", "value", solution.quality.balance.items())
+    )
     write_table(file.create_group("timings"), _timings(solution))
     write_table(file.create_group("plan"), [line._asdict() for line in solution.plan])
     write_table(file.create_group("checks"), [_flat(check) for check in checks])
@@ -184,7 +175,8 @@ def _read_solution(file: h5py.File) -> Solution:
     grid, point_data, cell_data = read_grid(file[GRID])
     names = sorted(file["contact"], key=lambda name: file["contact"][name].attrs["number"])
     volumes = [i for i, block in enumerate(grid.cells) if block.dim == grid.points.shape[1]]
-    scalars = _plain(file["solve"].attrs)
+    scalars, dim = _plain(file["solve"].attrs), grid.points.shape[1]
+    vectors = {name: point_data[name][:, :dim] for name in _VECTORS if name in point_data}
     return Solution(
         case=_read_case(file["case"]),
         mesh=meshio.Mesh(
@@ -192,7 +184,7 @@ def _read_solution(file: h5py.File) -> Solution:
             [grid.cells[i] for i in volumes],
             cell_sets={k: [sets[i] for i in volumes] for k, sets in grid.cell_sets.items()},
         ),
-        displacement=point_data["displacement"][:, : grid.points.shape[1]],
+        displacement=point_data["displacement"][:, :dim],
         stress=point_data["stress"],
         body=point_data["body"],
         bodies=_read_bodies(file["bodies"]),
@@ -200,26 +192,36 @@ def _read_solution(file: h5py.File) -> Solution:
             read_zone(file["contact"][name], name, _sub_faces(grid, cell_data, number))
             for number, name in enumerate(names)
         ],
-        nodal_normal_stress=point_data["normal_stress"],
-        balance=dict(_read_pairs(file["balance"], "name", "value")),
         steps=read_steps(file),
         plan=[Line(**row) for row in read_table(file["plan"])],
-        validity=Validity(**_plain(file["validity"].attrs)),
-        strain_energy=scalars.get("strain_energy"),
-        reaction=point_data["reaction"][:, : grid.points.shape[1]]
-        if "reaction" in point_data
-        else None,
-        probes=read_probes(file),
-        acted={key: data[()] for key, data in file["acted"].items()},
-        accuracy=_plain(file["accuracy"].attrs),
-        mean_stress={kind: data[()] for kind, data in file["mean_stress"].items()},
-        errors=_plain(file["errors"].attrs),
-        seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
-        stage_cpu_seconds=dict(_read_pairs(file["timings"], "stage", "cpu_seconds")),
-        motion=point_data["motion"][:, : grid.points.shape[1]] if "motion" in point_data else None,
+        scalars=Scalars(**_known(Scalars, scalars)),
+        fields=Fields(
+            normal_stress=point_data["normal_stress"],
+            mean_stress={kind: data[()] for kind, data in file["mean_stress"].items()},
+            **vectors,
+        ),
+        cost=Cost(
+            **_known(Cost, scalars),
+            seconds=dict(_read_pairs(file["timings"], "stage", "seconds")),
+            stage_cpu_seconds=dict(_read_pairs(file["timings"], "stage", "cpu_seconds")),
+        ),
+        quality=Quality(
+            balance=dict(_read_pairs(file["balance"], "name", "value")),
+            accuracy=_plain(file["accuracy"].attrs),
+            errors=_plain(file["errors"].attrs),
+            validity=Validity(**_plain(file["validity"].attrs)),
+        ),
+        places=Places(
+            probes=read_probes(file), acted={key: data[()] for key, data in file["acted"].items()}
+        ),
         earlier=[Position(*one) for one in read_earlier(file[GRID])],
-        **{key: scalars[key] for key in _SCALARS},
+        ended=scalars["ended"],
     )
+
+
+def _known(kind: type, scalars: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of the scalars that a record of a `kind` has."""
+    return {one.name: scalars[one.name] for one in fields(kind) if one.name in scalars}
 
 
 # The grid
@@ -302,10 +304,10 @@ def _flat(check: CheckResult) -> dict[str, Any]:
 
 
 def _timings(solution: Solution) -> list[dict[str, Any]]:
-    cpu = solution.stage_cpu_seconds
+    cpu = solution.cost.stage_cpu_seconds
     return [
         {"stage": stage, "seconds": seconds, "cpu_seconds": cpu.get(stage)}
-        for stage, seconds in solution.seconds.items()
+        for stage, seconds in solution.cost.seconds.items()
     ]
 
 

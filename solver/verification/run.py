@@ -30,14 +30,8 @@ from .judge import judge, without_result
 from .norms import errors
 from .provenance import gather
 from .results import read_result, write_result
-from .verdict import (
-    CRASHED,
-    FAILED,
-    REFUSED,
-    CheckResult,
-    Verdict,
-    write_verdict,
-)
+from .stored import write_verdict
+from .verdict import CRASHED, FAILED, REFUSED, CheckResult, Verdict
 
 # After so many seconds a process that meshes is ended: ten million unknowns take half of that.
 MESHING_SECONDS = 1800
@@ -137,7 +131,7 @@ def solve(
         solution = solved(case, mesh, options, clock)
         with stage(clock, "checks"):  # accepted values belong to the case's own mesh
             checks = checked(solution, job.refine == 1 and not solution.ended)
-        solution.cpu_seconds = processor_time() - started
+        solution.cost.cpu_seconds = processor_time() - started
         provenance = gather(job.case, job.mesh or case.mesh.get("path")) | inputs
         if output:
             with stage(clock, "write"):
@@ -176,7 +170,7 @@ def _mesh_of(job: Job, case: Case, clock: Clock) -> meshio.Mesh:
 
 def checked(solution: Solution, accepted: bool = True) -> list[CheckResult]:
     """The checks of a solution, those of `accepted` values too if asked; its errors are found."""
-    solution.errors = errors(solution)
+    solution.quality.errors = errors(solution)
     return run_checks(solution, accepted_values(solution) if accepted else {})
 
 

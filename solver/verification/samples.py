@@ -96,8 +96,8 @@ def status(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample
     """
     found = zone.closed.astype(float)
     expected = (reference_where_covered(solution, zone, reference) > 0).astype(float)
-    touching = zone.multiplier <= _TOUCHING * solution.load_scale
-    touching &= zone.gap <= _TOUCHING * solution.length
+    touching = zone.multiplier <= _TOUCHING * solution.scalars.load_scale
+    touching &= zone.gap <= _TOUCHING * solution.scalars.length
     expected = np.where(touching & (expected == 0), found, expected)
     if isinstance(reference, ExactValues):
         expected = np.where(reference.ends_within(zone), found, expected)
@@ -172,7 +172,7 @@ def surface_stress(side: str) -> Sampler:
 def nodal_stress(solution: Solution, _: None, reference: Reference) -> Sample:
     """The stress along the direction of contact at all nodes."""
     nodes = _nodes(solution)
-    values = solution.nodal_normal_stress[nodes]
+    values = solution.fields.normal_stress[nodes]
     if isinstance(reference, ExactValues):
         expected = reference.stress_along_contact(nodes)
     else:
@@ -270,7 +270,7 @@ def _hooke_in(
     if any(load.strains for load in solution.case.loads):
         initial = _initial_strain(solution, block, part, place).reshape(initial.shape)
     mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
-    if (mixed := solution.mean_stress.get(kind.name)) is not None:
+    if (mixed := solution.fields.mean_stress.get(kind.name)) is not None:
         own = mixed[part] @ values.T
         mean = np.where(np.isnan(own), mean, own)
     tensor = np.zeros((*mean.shape, 3, 3))
@@ -314,7 +314,7 @@ def norm(name: str) -> Sampler:
     def sample(solution: Solution, _: None, __: Reference) -> Sample | None:
         if name not in solution.case.tolerance:
             return None
-        value = solution.errors.get(name, float("nan"))
+        value = solution.quality.errors.get(name, float("nan"))
         return Sample(np.array([value]), np.zeros(1), lambda _: "the whole solve")
 
     return sample
@@ -322,8 +322,8 @@ def norm(name: str) -> Sampler:
 
 def balance(solution: Solution, _: None, __: Reference) -> Sample:
     """Every imbalance; the reference is zero."""
-    names = list(solution.balance)
-    values = np.array(list(solution.balance.values()), dtype=float)
+    names = list(solution.quality.balance)
+    values = np.array(list(solution.quality.balance.values()), dtype=float)
     return Sample(values, np.zeros(len(values)), lambda i: f"the balance of {names[i]}")
 
 

@@ -16,7 +16,7 @@ from ..system.files import write_text
 from ..system.progress import processor_time
 from .results import read_result
 from .run import mesh_of
-from .verdict import read_verdict
+from .stored import read_verdict
 
 # The places, in the order of cost, of the solves that are measured.
 _SAMPLES = (1 / 6, 1 / 2, 5 / 6)
@@ -49,7 +49,9 @@ def measure(results: Sequence[Path]) -> Savings | None:
     """
     found = [(read_verdict(result.with_name("verdict.json")), result) for result in results]
     costs = sorted(
-        (v.cpu_seconds or 0.0, result) for v, result in found if v.switches and not v.code
+        (v.cost.cpu_seconds or 0.0, result)
+        for v, result in found
+        if v.switches and not v.foreign.code
     )
     if not costs:
         return None

@@ -57,7 +57,7 @@ def unresolved(solution: Solution) -> str:
     """
     case, moved = solution.case, solution.displacement
     limit = allowed_of_pressure(case, LIMIT)
-    rounding = _ROUNDING * stress_of_motion(case, solution.length, moved)
+    rounding = _ROUNDING * stress_of_motion(case, solution.scalars.length, moved)
     for given, zone in zip(case.zones, solution.zones, strict=True):
         peak = zone.multiplier[zone.closed].max(initial=0.0)
         if zone.nodal is not None or not peak > rounding:

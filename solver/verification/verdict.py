@@ -2,24 +2,17 @@
 
 `verdict.json` holds it as a JSON object with the same keys. It is bound to what it judges: `digest`
 is the hash of all other keys, `result_sha256` that of the result file, and family and job are those
-of its folder. `read_verdict` finds a file damaged or edited, `unbound` one that was moved.
+of its folder (see `verification.stored`).
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import Any
 
-import msgspec
-import numpy as np
-
-from ..system.errors import InputError
-from ..system.files import seal_of, write_text
+from ..simulation.results.records import Cost, Validity
+from .flat import DIGEST, digest, flat, joined, plain
 from .units import percent
 
 PASSED, SOLVED, FAILED, UNRELIABLE = "passed", "solved", "failed", "unreliable"
@@ -36,8 +29,6 @@ NUMBERS = (
 """The checks of single numbers."""
 VECTORS = ("force", "reaction", "moment", "displacement_at", "stress_at")
 """Those of them that have a number for each component."""
-T = TypeVar("T")
-_DIGEST = "digest"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,27 +167,10 @@ class Body:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """The verdict of one solve; None and empty without a result.
+class Problem:
+    """What was solved. `units` names those of length, stress, area, force, moment and energy.
 
-    `judged` says how strictly a solve that passed was judged: `exact`, if the tolerances of all
-    checks against the reference are at most 1e-10; `expected error`, if the others follow from
-    expected errors; else `stated tolerance`. `worst` is the check with the largest relative error,
-    `closest_to_tolerance` the one nearest to its tolerance or furthest past it. Pairs are minimum
-    and maximum over all zones; `seconds` has wall times by stage and their `total`.
-    `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
-    reconstruction; `pressure_within` has the change by facets too, and is None where the pressure
-    is broken and nothing can be said. `units` names the units of length, stress, area, force,
-    moment and energy where the case does. `strain` to `facet_depth`: see
-    `solver.simulation.results.solution.Validity`.
-    `transient`: the machine is the reason (memory, disk, a kill), so that the same solve may
-    succeed another time.
-
-    Of the result of another code: `code`, its version and `settings`; `printed_digits` are the
-    significant ones of its values, where a file has fewer than a number; `not_given` are the checks
-    that it has no values for; `only` the fields that were to be compared, where that is a part of
-    what the case asks for on purpose, and `compared` at how many places each was; `recorded` has
-    date and source of values that were not computed here.
+    `zones`, with slave and master as solved, and `bodies` are empty without a result.
     """
 
     case: str = ""
@@ -208,59 +182,82 @@ class Verdict:
     variant: str = ""
     recovery: str = ""
     zones: list[Sides] = field(default_factory=list)
-    reference_kind: str | None = None
-    reference_uncertainty: float | None = None
-    reference_code: dict[str, str] | None = None
-    reference_remark: str | None = None
-    reference_solution: str | None = None
-    verdict: str
-    passed: bool = False
-    judged: str = ""
-    reason: str = ""
-    result: str | None = None
-    result_sha256: str | None = None
-    dofs: int | None = None
-    macro_elements: int | None = None
-    iterations: int | None = None
-    linear_solver: str | None = None
-    linear_iterations: int | None = None
-    matrix_entries: int | None = None
     units: dict[str, str] = field(default_factory=dict)
+    bodies: list[Body] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """Where a reference comes from. Keys of the file begin with `reference_`."""
+
+    kind: str | None = None
+    uncertainty: float | None = None
+    code: dict[str, str] | None = None
+    remark: str | None = None
+    solution: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Values:
+    """What was found. Pairs are minimum and maximum over all zones."""
+
     length: float | None = None
     load_scale: float | None = None
-    pressure_error_estimate: float | None = None
-    strain: float | None = None
-    rotation: float | None = None
-    slip: float | None = None
-    pushed_past: int | None = None
-    partly_covered: int | None = None
-    unpaired: float | None = None
-    facets: float | None = None
-    facet_depth: float | None = None
-    pressure_within: float | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
-    stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
-    cpu_seconds: float | None = None
-    peak_memory_mb: float | None = None
+    largest_displacement: float | None = None
+    strain_energy: float | None = None
     pressure: list[float | None] | None = None
     stress: list[float | None] | None = None
     gap: list[float | None] | None = None
     status: list[int] | None = None
     coverage: list[float | None] | None = None
-    worst: CheckError | None = None
-    closest_to_tolerance: CheckError | None = None
-    bodies: list[Body] = field(default_factory=list)
-    plan: list[list[str]] = field(default_factory=list)
-    checks: list[CheckResult] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
     dissipation: list[float] = field(default_factory=list)
     probes: list[Probed] = field(default_factory=list)
-    largest_displacement: float | None = None
-    strain_energy: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimates:
+    """How far the values can be relied on.
+
+    `accuracy`: what rounding alone may change, relative, by cause, `attainable` the largest of
+    these. `pressure_error_estimate` is relative and in L2: how far constant pressures are from a
+    reconstruction; `pressure_within` has the change by facets too, and is None where the pressure
+    is broken and nothing can be said. `errors` are norms against an exact solution. `validity`, of
+    which the file has the single keys: see `solver.simulation.results.records.Validity`.
+    """
+
     accuracy: dict[str, float] = field(default_factory=dict)
     attainable: float | None = None
+    pressure_error_estimate: float | None = None
+    pressure_within: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
+    validity: Validity | None = field(default=None, metadata=joined(Validity))
+
+    @property
+    def strain(self) -> float | None:
+        """The largest principal strain."""
+        return self.validity.strain if self.validity else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """The result file beside the verdict and its hash; versions, revision, inputs, machine."""
+
+    result: str | None = None
+    result_sha256: str | None = None
     provenance: dict[str, str | int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Foreign:
+    """What is known of the result of another code: `code`, its version and `settings`.
+
+    `printed_digits` are the significant ones of its values, where a file has fewer than a number;
+    `not_given` are the checks that it has no values for; `only` the fields that were to be
+    compared, where that is a part of what the case asks for on purpose, and `compared` at how many
+    places each was; `recorded` has date and source of values that were not computed here.
+    """
+
     code: str | None = None
     code_version: str = ""
     settings: dict[str, str] = field(default_factory=dict)
@@ -269,7 +266,41 @@ class Verdict:
     only: list[str] = field(default_factory=list)
     compared: dict[str, str] = field(default_factory=dict)
     recorded: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The verdict of one solve; None and empty without a result.
+
+    `judged` says how strictly a solve that passed was judged: `exact`, if the tolerances of all
+    checks against the reference are at most 1e-10; `expected error`, if the others follow from
+    expected errors; else `stated tolerance`. `worst` is the check with the largest relative error,
+    `closest_to_tolerance` the one nearest to its tolerance or furthest past it. `transient`: the
+    machine is the reason (memory, disk, a kill), so that the same solve may succeed another time.
+
+    Of the records in it the file has the single keys, beside one another.
+    """
+
+    problem: Problem = field(metadata=joined(Problem))
+    verdict: str
+    judged: str = ""
+    reason: str = ""
     transient: bool = False
+    worst: CheckError | None = None
+    closest_to_tolerance: CheckError | None = None
+    checks: list[CheckResult] = field(default_factory=list)
+    plan: list[list[str]] = field(default_factory=list)
+    values: Values = field(default_factory=Values, metadata=joined(Values))
+    estimates: Estimates = field(default_factory=Estimates, metadata=joined(Estimates))
+    reference: Origin = field(default_factory=Origin, metadata=joined(Origin, "reference_"))
+    cost: Cost = field(default_factory=Cost, metadata=joined(Cost))
+    files: Files = field(default_factory=Files, metadata=joined(Files))
+    foreign: Foreign = field(default_factory=Foreign, metadata=joined(Foreign))
+
+    @property
+    def passed(self) -> bool:
+        """Whether all checks hold, one of them against a reference, with digits enough."""
+        return self.verdict == PASSED
 
     @property
     def sound(self) -> bool:
@@ -284,8 +315,8 @@ class Verdict:
     @property
     def summary(self) -> str:
         """One line: job, word, reason or largest checked error, time."""
-        line = f"{self.job}: {self.verdict}"
-        line += f" ({', '.join(self.only)} only)" if self.only else ""
+        line = f"{self.problem.job}: {self.verdict}"
+        line += f" ({', '.join(self.foreign.only)} only)" if self.foreign.only else ""
         if self.reason:
             return f"{line}: {self.reason}{self.estimate}"
         error = (
@@ -298,103 +329,22 @@ class Verdict:
         if worst and worst.expected:
             error += f", expected {worst.expected:.1e}"
         error += self.estimate
-        missing = f", not given: {', '.join(self.not_given)}" if self.not_given else ""
-        time = f", {self.seconds['total']:.2f} s" if "total" in self.seconds else ""
+        missing = (
+            f", not given: {', '.join(self.foreign.not_given)}" if self.foreign.not_given else ""
+        )
+        time = f", {self.cost.seconds['total']:.2f} s" if "total" in self.cost.seconds else ""
         return f"{line}{error}{missing}{time}"
 
     @property
     def estimate(self) -> str:
         """The estimated error of the pressure, for the end of a line; empty without a result."""
-        if not self.pressure or not self.zones or self.code:
+        if not self.values.pressure or not self.problem.zones or self.foreign.code:
             return ""
-        if self.pressure_within is None:
+        if self.estimates.pressure_within is None:
             return ", error of the pressure unknown"
-        return f", pressure within {percent(self.pressure_within)} (estimated)"
+        return f", pressure within {percent(self.estimates.pressure_within)} (estimated)"
 
     def plain(self) -> dict[str, Any]:
         """The verdict as plain values for strict JSON, with its digest."""
-        content = msgspec.json.decode(_encoded(asdict(self)))
-        return content | {_DIGEST: _digest(content)}
-
-
-def write_verdict(path: str | Path, verdict: Verdict) -> None:
-    """Write a verdict as strict JSON: whole or not at all."""
-    write_text(path, to_json(verdict.plain()) + "\n")
-
-
-def read_verdict(path: str | Path) -> Verdict:
-    """The verdict in a file; `InputError` where it is not, to the last digit, what was written."""
-    path = Path(path)
-    try:
-        content = json.loads(path.read_bytes())
-    except FileNotFoundError:
-        raise InputError(path, "file", None, "there is no verdict: the job was ended") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise _damaged(path, " ".join(str(error).split())) from None
-    verdict = typed(Verdict, content, path)
-    if content.pop(_DIGEST, None) != _digest(content):
-        raise _damaged(path, "it is not as it was written")
-    if verdict.verdict not in WORDS:
-        raise _damaged(path, f"no such verdict: {verdict.verdict}")
-    return verdict
-
-
-def unbound(verdict: Verdict, path: Path) -> str:
-    """Why folder (in `results`) or result do not belong to the verdict; empty if they do.
-
-    Reads the whole result.
-    """
-    *_, root, family, job = ("", "", *path.absolute().parts[:-1])
-    if root == "results" and (family, job) != (verdict.family, verdict.job):
-        return f"the verdict belongs to {verdict.family}/{verdict.job}"
-    if verdict.result is not None:
-        seal = seal_of(path.parent / verdict.result)
-        if not seal:
-            return f"the result {verdict.result} is missing or damaged"
-        if seal != verdict.result_sha256:
-            return f"the result {verdict.result} belongs to another solve"
-    return ""
-
-
-def typed(kind: type[T], content: object, where: Path) -> T:
-    """Plain values, as `json.loads` returns them, as typed verdicts; `InputError` otherwise.
-
-    Unknown keys are ignored. A key that is missing or null has its default, NaN for a number.
-    """
-    try:
-        return msgspec.convert(_without_nulls(content), kind)
-    except msgspec.ValidationError as error:
-        said, _, place = str(error).partition(" - at ")
-        key = place.strip("`").removeprefix("$").removeprefix(".")
-        raise InputError(where, key or "file", None, f"not as in a verdict: {said}") from None
-
-
-def _without_nulls(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nulls(item) for key, item in value.items() if item is not None}
-    return [_without_nulls(item) for item in value] if isinstance(value, list) else value
-
-
-def to_json(content: Any) -> str:
-    """Strict JSON of plain values, arrays and numbers; numbers that are not finite become null."""
-    return msgspec.json.format(_encoded(content), indent=1).decode()
-
-
-def _encoded(content: Any) -> bytes:
-    return msgspec.json.encode(content, enc_hook=_of_numpy)
-
-
-def _of_numpy(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no place in JSON")
-
-
-def _damaged(path: Path, why: str) -> InputError:
-    return InputError(path, "file", None, f"damaged verdict ({why})")
-
-
-def _digest(content: Mapping[str, Any]) -> str:
-    """The hash of plain values, whatever the order of their keys."""
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+        content = plain(flat(self) | {"passed": self.passed})
+        return content | {DIGEST: digest(content)}

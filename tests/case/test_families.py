@@ -18,7 +18,7 @@ CASES = Path(__file__).parents[2] / "cases"
 def solved(name, swapped=False):
     case = load_case(CASES / f"{name}.yaml")
     solution = simulate(case.as_solved(swapped), mesh_of(case))
-    solution.errors = errors(solution)
+    solution.quality.errors = errors(solution)
     return solution
 
 
@@ -29,7 +29,7 @@ def test_a_hertz_contact_settles_in_few_iterations(name, swapped):
     assert all(check.passed for check in run_checks(solution))
     zone = solution.zones[0]
     assert 0.3 < zone.closed.mean() < 0.7
-    assert solution.iterations <= 4
+    assert solution.cost.iterations <= 4
 
 
 def test_a_punch_wider_than_the_block_counts_only_what_is_covered():

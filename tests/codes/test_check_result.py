@@ -12,7 +12,7 @@ from solver.codes.foreign import Field, ForeignResult
 from solver.codes.verdicts import check_foreign
 from solver.commands.cli import main
 from solver.system.errors import InputError
-from solver.verification.verdict import read_verdict
+from solver.verification.stored import read_verdict
 from tests.codes import results
 
 CASE = str(results.ROOT / "cases/ssnp170/a.yaml")
@@ -36,18 +36,22 @@ def test_an_exact_answer_passes_every_check_that_it_gives_values_for(check, tmp_
     assert status == 0, said
     folder = tmp_path / "results/ssnp170/ssnp170-a@mine"
     verdict = read_verdict(folder / "verdict.json")
-    assert (verdict.verdict, verdict.code, verdict.job) == ("passed", "mine", "ssnp170-a@mine")
+    assert (verdict.verdict, verdict.foreign.code, verdict.problem.job) == (
+        "passed",
+        "mine",
+        "ssnp170-a@mine",
+    )
     ran = {check.name for check in verdict.checks}
     assert ran == {
         *("multiplier", "nodal_stress", "surface_stress_slave", "surface_stress_master"),
         *("displacement", "stress_components", "balance"),
     }
-    assert set(verdict.not_given) == {
+    assert set(verdict.foreign.not_given) == {
         *("element_pressure", "element_gap", "element_status", "coverage", "covered_pressure"),
         "integration_stress",
     }
     assert all(check.error < 1e-12 for check in verdict.checks)
-    assert verdict.pressure == [25.0, 25.0]
+    assert verdict.values.pressure == [25.0, 25.0]
     rows = np.loadtxt(folder / "pressure.csv", delimiter=",", skiprows=1)
     assert len(rows) == 18
     assert np.allclose(rows[:, 1:], [0.0, 25.0], atol=1e-12)
@@ -247,8 +251,8 @@ def test_hertz_is_checked_by_its_norms(tmp_path):
     place = mesh.points[slave]
     exact = case.solution.contact_pressure(place)
     good = check_foreign(case, foreign(pressure=Field(places=place, values=exact)), mesh)
-    assert good.errors["half_width"] < 0.01
-    assert good.errors["peak"] < 0.01
+    assert good.estimates.errors["half_width"] < 0.01
+    assert good.estimates.errors["peak"] < 0.01
     wide = np.where(np.abs(place[:, 0]) < 2.0, exact.max() / 3, 0.0)
     bad = check_foreign(case, foreign(pressure=Field(places=place, values=wide)), mesh)
     assert bad.verdict == "failed"
@@ -352,9 +356,11 @@ def test_a_part_may_be_asked_for():
     mesh, case = results.mesh_and_case("ssnp170/a")
     _, whole = parts(results.patch())
     found = check_foreign(case, foreign(displacement=whole["displacement"]), mesh, ["displacement"])
-    assert (found.verdict, found.only) == ("passed", ["displacement"])
+    assert (found.verdict, found.foreign.only) == ("passed", ["displacement"])
     assert "passed (displacement only)" in found.summary
-    assert found.compared == {"displacement": f"{len(mesh.points)} of {len(mesh.points)} nodes"}
+    assert found.foreign.compared == {
+        "displacement": f"{len(mesh.points)} of {len(mesh.points)} nodes"
+    }
     lacking = check_foreign(case, foreign(displacement=whole["displacement"]), mesh, ALL)
     assert lacking.verdict == "partial"
     assert "not given: stress, pressure" in lacking.reason

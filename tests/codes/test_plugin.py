@@ -39,12 +39,12 @@ def pressure_error(verdict):
 
 def test_the_toy_of_the_documentation(tmp_path):
     verdict = run_case(find(str(TOY)), *matching("QUAD4", "TRIA3"), tmp_path, Limits())
-    assert (verdict.verdict, verdict.code) == ("passed", "toy")
+    assert (verdict.verdict, verdict.foreign.code) == ("passed", "toy")
     assert pressure_error(verdict) < 1e-9
     # On edges that do not match: not exact, and not far off.
     verdict = run_case(find(str(TOY)), *case_of("QUAD4", "TRIA3"), tmp_path, Limits())
     assert 1e-9 < pressure_error(verdict) < 1e-2
-    assert verdict.settings["contact"].startswith("penalty")
+    assert verdict.foreign.settings["contact"].startswith("penalty")
 
 
 def test_the_toy_has_no_quadratic_cells(tmp_path):

@@ -9,7 +9,7 @@ from solver.codes.deck import UnsupportedError
 from solver.codes.foreign import Field, ForeignResult
 from solver.codes.run import Limits, run_case
 from solver.lac.errors import SolveError
-from solver.verification.verdict import read_verdict
+from solver.verification.stored import read_verdict
 from tests.codes.blocks import case_of
 
 
@@ -51,7 +51,7 @@ def run(tmp_path, *arguments, **limits):
     verdict = run_case(Fake(*arguments), case, mesh, tmp_path / "out", Limits(**limits))
     stored = read_verdict(tmp_path / "out/verdict.json")
     assert (stored.verdict, stored.reason) == (verdict.verdict, verdict.reason)
-    assert (verdict.code, verdict.settings) == ("fake", {"penalty": "50 E"})
+    assert (verdict.foreign.code, verdict.foreign.settings) == ("fake", {"penalty": "50 E"})
     return verdict
 
 
@@ -72,7 +72,7 @@ def test_no_result_is_a_verdict_with_its_reason(tmp_path, text, word, reason):
     verdict = run(tmp_path, text, seconds=1, memory=200e6)
     assert (verdict.verdict, verdict.passed) == (word, False)
     assert reason in verdict.reason
-    assert verdict.code_version == "1.0"
+    assert verdict.foreign.code_version == "1.0"
 
 
 def test_a_code_that_is_not_installed(tmp_path):
@@ -84,7 +84,7 @@ def test_a_code_that_is_not_installed(tmp_path):
 def test_a_result_is_checked(tmp_path, value, word):
     verdict = run(tmp_path, f"print({value})")
     assert verdict.verdict == word
-    assert verdict.seconds["total"] > 0
+    assert verdict.cost.seconds["total"] > 0
     assert (tmp_path / "out/log").read_text() == f"{value}\n"
 
 

@@ -36,7 +36,7 @@ def test_the_ball_is_carried_by_the_cup(solution):
     [zone] = solution.zones
     forces = zone.multiplier * zone.area * zone.coverage
     assert 4 * forces @ zone.normal[:, 2] == pytest.approx(FORCE, rel=2e-4)
-    assert max(solution.balance.values()) < 1e-10
+    assert max(solution.quality.balance.values()) < 1e-10
 
 
 def test_the_largest_pressure_is_that_of_hertz(solution):

@@ -61,7 +61,7 @@ def tried(row: Row) -> Outcome:
         return Outcome("wrong", np.inf, f"{type(error).__name__}: {error}")
     errors = errors_of(problem, solution)
     what, error = max(errors.items(), key=lambda pair: pair[1])
-    estimate = max(solution.accuracy.values(), default=0.0)
+    estimate = max(solution.quality.accuracy.values(), default=0.0)
     allowed = min(ROUNDING, max(EXACT, _MARGIN * estimate))
     if row["materials"] == "stiff master":  # rounded displacements of its supports are stresses
         allowed = _MARGIN * _STIFF
@@ -91,8 +91,8 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
     found: dict[str, float] = {}
     moved, wanted = solution.displacement, np.zeros_like(solution.displacement)
     given = solution.mesh.points
-    if solution.motion is not None:
-        moved, given = moved + solution.motion, given - solution.motion
+    if solution.fields.motion is not None:
+        moved, given = moved + solution.fields.motion, given - solution.fields.motion
     seen = np.zeros(len(moved), dtype=bool)
     for number, info in enumerate(solution.bodies):
         if (body := exact_of.get(info.name)) is None:

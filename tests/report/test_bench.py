@@ -17,7 +17,7 @@ from solver.report import write_report
 from solver.report.bench import digits
 from solver.system.errors import InputError
 from solver.verification.run import Job, solve
-from solver.verification.verdict import write_verdict
+from solver.verification.stored import write_verdict
 from tests.browser import MISSING, browser
 from tests.codes import results as handmade
 from tests.report.test_charts import specifications

@@ -162,7 +162,7 @@ def test_a_file_and_a_page_elsewhere(tmp_path, capsys):
     [
         (None, "must be a folder of results with a report, or its summary.json"),
         ('[{"job": ', "must be JSON ("),
-        ("{}", "Expected `array`, got `object`"),
+        ("{}", "not as in a verdict: must be a list"),
         (
             '[{"job": "a", "family": "b"}]',
             "[0]: not as in a verdict: Object missing",

@@ -86,8 +86,8 @@ def test_arrows_follow_the_load(tmp_path):
     assert np.array(steps) == pytest.approx(np.array([(100, 0), (200, 0), (300, 0)]), abs=1)
     assert "traction (x, 0)" in svg
     long = Load("press", traction=(Expression("sin(x) * sin(x) + cos(x) * cos(x)"), 0.0))
-    acted = solution.acted["loads[0].group"]
-    solution.acted |= {f"loads[{i}].group": acted for i in (1, 2)}
+    acted = solution.places.acted["loads[0].group"]
+    solution.places.acted |= {f"loads[{i}].group": acted for i in (1, 2)}
     solution.case = replace(solution.case, loads=(load, long, load))
     texts = list(ET.fromstring(draw_case(solution, "")).iter(f"{SVG}text"))
     labels = {t.text: float(t.get("y")) for t in texts if t.get("fill") == RED}
@@ -107,7 +107,7 @@ def test_supports_of_a_picture_in_space(tmp_path):
     assert polygons(svg, fill=RED) == 4
     words = {text.text for text in ET.fromstring(svg).iter(f"{SVG}text")}
     assert {"10 × 10 × 20", "pressure 25", "z"} <= words
-    solution.acted = {}
+    solution.places.acted = {}
     assert polygons(draw_case(solution, "solid"), stroke=GREEN) == 0
 
 
@@ -136,7 +136,7 @@ def test_space_picture_colours_sub_faces_by_pressure(tmp_path):
 
 def test_a_small_contact_is_enlarged(tmp_path):
     solution = handmade.plane(tmp_path)
-    zone, solution.length = solution.zones[0], 100.0
+    zone, solution.scalars.length = solution.zones[0], 100.0
     whole = draw_case(solution, "")
     assert '<svg x="' not in whole
     zone.multiplier[1] = 0.0  # the contact from 0 to 25, and 15 % around it

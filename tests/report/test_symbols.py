@@ -103,7 +103,7 @@ def shapes(svg, corners, **attributes):
 def with_support(folder, support):
     """Two blocks of which the upper one's top has another support, and no load."""
     solution = handmade.plane(folder)
-    solution.acted = {"supports[0].group": np.arange(18, 22)}
+    solution.places.acted = {"supports[0].group": np.arange(18, 22)}
     solution.case = replace(solution.case, supports=(support,), loads=())
     return solution
 
@@ -153,7 +153,7 @@ def test_both_sides_of_a_sector_are_marked(tmp_path):
     cyclic = Cyclic("sym", shift=(50.0, 0.0))
     solution = with_support(tmp_path, Support(group="far", cyclic=cyclic))
     right, left = np.array([6, 13, 17, 21]), np.array([0, 7, 14, 18])
-    solution.acted = {"supports[0].group": right, "supports[0].cyclic.of": left}
+    solution.places.acted = {"supports[0].group": right, "supports[0].cyclic.of": left}
     svg = draw_case(solution, "")
     marks = sorted({x - 2.5 for x, _ in shapes(svg, 4, fill=GREEN)})
     assert len(shapes(svg, 4, fill=GREEN)) == 8

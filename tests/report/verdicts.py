@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from solver.verification.verdict import Verdict, typed, write_verdict
+from solver.verification.stored import typed, write_verdict
+from solver.verification.verdict import Verdict
 
 
 def record(content):

@@ -61,7 +61,7 @@ def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compr
     stress = exact.stress_at(found.body == found.body[found.zones[0].master_nodes[0]])
     errors = [np.abs(zone.multiplier / exact.pressure - 1).max() for zone in found.zones]
     errors.append(np.abs(found.stress - stress).max() / exact.pressure)
-    return max(errors) / Accuracy(found.accuracy).estimate
+    return max(errors) / Accuracy(found.quality.accuracy).estimate
 
 
 @pytest.mark.parametrize("young", [20.0, 2000.0, 2e5])
@@ -106,15 +106,15 @@ def pressed(pressure):
 def test_large_strain_is_noted_or_unreliable(pressure, noted, unreliable, tmp_path):
     found = pressed(pressure)
     strain = (1 - POISSON**2) * pressure / YOUNG
-    assert found.validity.strain == pytest.approx(strain, rel=1e-12)
-    assert found.validity.rotation < 1e-13 * strain
+    assert found.quality.validity.strain == pytest.approx(strain, rel=1e-12)
+    assert found.quality.validity.rotation < 1e-13 * strain
     assert any(line.what.startswith("largest strain") for line in found.plan) == noted
     file = tmp_path / "r.vtkhdf"
     write_result(file, found, [], {})
     for solution in (found, read_result(file).solution):
         verdict = judge(solution, [])
         assert (verdict.verdict == "unreliable") == unreliable
-        assert verdict.strain == found.validity.strain
+        assert verdict.estimates.validity.strain == found.quality.validity.strain
         assert ("strain 1.1e+02 with rotation" in verdict.reason) == unreliable
 
 
@@ -166,8 +166,8 @@ def test_bodies_that_only_move(scale, base, press):
     found = solve_case(blocks(scale, moved))
     assert found.verdict == "solved", found.reason
     assert found.pressure.max() <= 1e-12 * 2000.0
-    assert found.outcome.attainable < 1e-10
-    assert max(found.solution.balance.values()) < 1e-12
+    assert found.outcome.estimates.attainable < 1e-10
+    assert max(found.solution.quality.balance.values()) < 1e-12
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
@@ -178,7 +178,7 @@ def test_bodies_that_expand_freely(scale):
     case["supports"].append({"group": "press", "spring": {"y": 1e-9 / scale}})
     found = solve_case(case)
     assert found.verdict == "solved", found.reason
-    assert found.outcome.attainable < 1e-4
+    assert found.outcome.estimates.attainable < 1e-4
 
 
 def test_a_sliver_under_the_end_of_the_master_loosens_no_limit():

@@ -60,7 +60,7 @@ def errors(solution, held, poisson=POISSON):
         "stress": np.abs(solution.stress - stress).max() / PRESSURE,
         "displacement": np.abs(solution.displacement - exact).max() * YOUNG / PRESSURE,
         "coverage": np.abs(zone.coverage - 1).max(),
-        "balance": max(solution.balance.values()),
+        "balance": max(solution.quality.balance.values()),
     }
 
 

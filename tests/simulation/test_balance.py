@@ -38,7 +38,7 @@ def test_reactions_of_the_patch_test(swapped):
     assert held["base"].moment == pytest.approx([0, 0, 12.5], abs=1e-12)
     assert held["symx"].force == pytest.approx([0, 0], abs=1e-12)
     energy = (1 - POISSON**2) * PRESSURE**2 / YOUNG / 2 * 2
-    assert found.strain_energy == pytest.approx(energy)
+    assert found.scalars.strain_energy == pytest.approx(energy)
     size, place = found.largest_displacement
     strain = PRESSURE / YOUNG * np.array([POISSON * (1 + POISSON), 2 * (1 - POISSON**2)])
     assert place == pytest.approx([1, 1])
@@ -74,7 +74,7 @@ def test_a_rigid_body_reports_the_force_on_it():
 def test_mixed_form_has_the_same_energy():
     mixed = ("poisson: 0.3", "poisson: 0.3, form: mixed")
     found = simulate(changed_case(2, mixed), block_mesh("QUAD9", "TRIA6", (3, 2)))
-    assert found.strain_energy == pytest.approx(0.284375)
+    assert found.scalars.strain_energy == pytest.approx(0.284375)
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -122,7 +122,7 @@ def test_springs_have_a_reaction_and_no_strain_energy():
     assert list(held) == ["symx", "springs"]
     assert held["springs"].force == pytest.approx([0, 25], abs=1e-11)
     assert held["springs"].moment == pytest.approx([0, 0, 12.5], abs=1e-11)
-    assert found.strain_energy == pytest.approx(0.284375)
+    assert found.scalars.strain_energy == pytest.approx(0.284375)
 
 
 def test_supports_that_are_not_at_right_angles_hold_the_load_together():

@@ -42,7 +42,7 @@ def patch_errors(dim, pressure=25.0, **scene):
     zone = solution.zones[0]
     return (
         np.abs(zone.multiplier / pressure - 1).max(),
-        np.abs(solution.nodal_normal_stress / pressure + 1).max(),
+        np.abs(solution.fields.normal_stress / pressure + 1).max(),
     )
 
 

@@ -66,7 +66,7 @@ def law(solution):
 def test_every_plate_ends_in_a_state_that_keeps_coulombs_law(mu, push):
     solution = solved(plate(mu, push))
     assert law(solution) < 1e-9
-    assert max(solution.balance.values()) < 1e-11
+    assert max(solution.quality.balance.values()) < 1e-11
     assert solution.steps[0].dissipation > 0
     found = solution.zones[0].friction
     assert {1, 2} <= set(found.status.tolist())
@@ -79,7 +79,7 @@ def test_products_in_place_of_a_matrix_find_the_same_state(monkeypatch):
     uneven = "plane: strain\ntransform: {perturb: 0.2}"
     case = plate(0.5, 0.05, change=lambda text: text.replace("plane: strain", uneven))
     dense = solved(case)
-    assert dense.iterations <= 4
+    assert dense.cost.iterations <= 4
     monkeypatch.setattr(problems, "_MOST_ROWS", 0)
     product = solved(case)
     np.testing.assert_allclose(product.displacement, dense.displacement, atol=1e-12)
@@ -199,7 +199,7 @@ def test_a_recovered_stick_zone_keeps_the_law_and_the_balance():
     case = load_case(CASES / "friction" / "ladders" / "cylinder-tria6.yaml")
     constant, recovered = (solved(case.as_solved(recovery=r)) for r in (None, "automatic"))
     assert law(recovered) < 1e-9
-    assert max(recovered.balance.values()) < 1e-11
+    assert max(recovered.quality.balance.values()) < 1e-11
     status = recovered.zones[0].friction.status
     np.testing.assert_array_equal(status, constant.zones[0].friction.status)
     assert {0, 1, 2} == set(status.tolist())
@@ -211,7 +211,7 @@ def test_friction_across_a_meshed_gap_is_a_couple_and_no_imbalance():
     """A rigid cylinder: its tractions act on its own face, a gap above the half-plane."""
     case = load_case(CASES / "friction" / "rigid-cylinder-tria6.yaml")
     solution = solved(case)
-    assert max(solution.balance.values()) < 1e-12
+    assert max(solution.quality.balance.values()) < 1e-12
     zone, exact = solution.zones[0], case.solution
     force = zone.multiplier * zone.area
     place = (force @ zone.centre[:, 0]) / force.sum()
@@ -219,7 +219,7 @@ def test_friction_across_a_meshed_gap_is_a_couple_and_no_imbalance():
     expected = -(2 + 2 / 3) * exact.skew * exact.half_width
     assert place == pytest.approx(expected, rel=0.02)
     recovered = solved(case.as_solved(recovery="automatic"))
-    assert max(recovered.balance.values()) < 1e-12
+    assert max(recovered.quality.balance.values()) < 1e-12
     norms = [errors(each)["traction_l2"] for each in (solution, recovered)]
     assert norms[1] < norms[0]
 

@@ -47,7 +47,7 @@ def brick(plane, load, supports="", cells="", material=""):
     mesh = generate({"recipe": "bricks", "bricks": [recipe]}, "test")
     case = parse_case(text.replace("poisson: 0.3", "poisson: 0.3" + material), Path("b.yaml"))
     found = simulate(case, mesh)
-    assert max(found.balance.values()) < 1e-12
+    assert max(found.quality.balance.values()) < 1e-12
     return found
 
 
@@ -63,7 +63,7 @@ def test_a_free_body_expands_without_stress(plane, form):
     rest = found.stress - zz * E * np.eye(6)[2]
     assert np.abs(rest).max() < 1e-12 * YOUNG * E
     # Where the strain across the plane is held, its stress has the energy.
-    assert found.strain_energy == pytest.approx(-zz * E * E / 2, abs=1e-12 * YOUNG * E**2)
+    assert found.scalars.strain_energy == pytest.approx(-zz * E * E / 2, abs=1e-12 * YOUNG * E**2)
 
 
 @pytest.mark.parametrize(("plane", "form"), FORMS)
@@ -78,7 +78,7 @@ def test_a_clamped_body_is_pressed_all_over(plane, form):
     assert np.abs(found.stress - exact).max() < 1e-12 * pressed
     volume = np.pi if plane == "axisymmetric" else 1.0
     energy = pressed * E * (2 if flat else 3) / 2 * volume
-    assert found.strain_energy == pytest.approx(energy, rel=1e-12)
+    assert found.scalars.strain_energy == pytest.approx(energy, rel=1e-12)
 
 
 @pytest.mark.parametrize(("plane", "form"), FORMS)
@@ -110,7 +110,7 @@ def test_a_given_strain_is_taken_by_component():
     assert found.stress == pytest.approx(
         np.tile([plane, plane, zz, 0, 0, 0], (len(found.stress), 1))
     )
-    assert found.strain_energy == pytest.approx(-plane * E / 2, rel=1e-12)
+    assert found.scalars.strain_energy == pytest.approx(-plane * E / 2, rel=1e-12)
 
 
 BLOCKS = """\
@@ -158,7 +158,7 @@ def test_a_heated_block_between_walls_presses_on_the_other(plane, pair, counts, 
     found, pressure = between_walls(plane, pair, swapped, counts), WALLS[plane]
     assert np.abs(found.zones[0].multiplier / pressure - 1).max() < 1e-12
     assert np.abs(found.zones[0].pressure_of_forces / pressure - 1).max() < 1e-12
-    assert max(found.balance.values()) < 1e-12
+    assert max(found.quality.balance.values()) < 1e-12
     across = np.delete(found.stress, 1 if plane else 2, axis=1)
     along = found.stress[:, 1 if plane else 2]
     assert np.abs(along / pressure + 1).max() < 1e-11
@@ -236,7 +236,7 @@ def test_steps_scale_the_strain_of_their_name():
     forces = [step.resultants["contact"].force[1] for step in found.steps]
     assert np.abs(forces) == pytest.approx(YOUNG * E * np.array([0.5, 0.25, 0.75]), rel=1e-12)
     assert np.abs(found.stress[:, 1] + 0.75 * YOUNG * E).max() < 1e-11
-    assert found.strain_energy == pytest.approx((0.75 * YOUNG * E) ** 2 / YOUNG, rel=1e-12)
+    assert found.scalars.strain_energy == pytest.approx((0.75 * YOUNG * E) ** 2 / YOUNG, rel=1e-12)
 
 
 @pytest.mark.parametrize(

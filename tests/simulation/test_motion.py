@@ -53,7 +53,7 @@ def run(case):
 
 def whole(solution):
     """The displacement from the mesh as given."""
-    return solution.motion + solution.displacement
+    return solution.fields.motion + solution.displacement
 
 
 def test_a_path_and_its_reverse_come_back():
@@ -204,7 +204,7 @@ def test_a_block_is_pulled_up_a_slope():
         force = step.resultants["interface"].force
         assert force == pytest.approx([-ratio * weight, weight], rel=2e-5)
     moved = whole(solution)[solution.body == solution.body[-1]]
-    assert solution.motion[:, 1].max() == pytest.approx(9 * np.sin(alpha), rel=1e-3)
+    assert solution.fields.motion[:, 1].max() == pytest.approx(9 * np.sin(alpha), rel=1e-3)
     assert np.isfinite(moved).all()
 
 
@@ -321,7 +321,7 @@ def test_small_motion_is_that_of_linear_theory():
     small = [{"press": 1, "pull": 0.01}]
     one, other = (run(moving(steps=small, motion=motion)) for motion in ("small", "large"))
     assert other.displacement == pytest.approx(one.displacement, abs=1e-15)
-    assert not other.motion.any()
+    assert not other.fields.motion.any()
     assert any("followed" in line.what for line in other.plan)
     assert not any("followed" in line.what for line in one.plan)
 
@@ -346,7 +346,7 @@ def test_the_slip_of_all_steps_turns_with_the_slave():
     total = solution.zones[0].friction.slip_total[:, 0]
     assert total.max() == pytest.approx(2 * 5.0, rel=0.1)  # each face is passed by two columns
     joined = _joined(case.until(1), [replace(solution, steps=solution.steps[:1], earlier=[])])
-    assert joined.validity == solution.validity
+    assert joined.quality.validity == solution.quality.validity
 
 
 FAULTS = {

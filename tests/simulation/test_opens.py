@@ -64,7 +64,7 @@ def assert_opened(opened, solution):
         assert {k: v.size // len(v) for k, v in data.items()} == fields
     np.testing.assert_array_equal(point_data["displacement"][:, :dim], solution.displacement)
     np.testing.assert_array_equal(point_data["stress"], solution.stress)
-    np.testing.assert_array_equal(point_data["reaction"][:, :dim], solution.reaction)
+    np.testing.assert_array_equal(point_data["reaction"][:, :dim], solution.fields.reaction)
     on_face = cell_data["zone"] >= 0
     assert np.isnan(cell_data["pressure"][~on_face]).all()
     owner = cell_data["macro_element"][on_face]

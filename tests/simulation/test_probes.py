@@ -46,14 +46,16 @@ def test_probes_have_the_exact_values_also_stored(swapped, tmp_path):
         for name in ("displacement_at", "stress_at", "pressure_at"):
             assert found[name].passed
             assert found[name].error < 1e-12
-        assert len(one.probes["rim"].place) > 4
-        assert one.probes["both"].stress[0, 1] == pytest.approx(-25)
-        assert np.isnan(one.probes["middle"].stress).all()
-    (line,) = solution.probes["middle"].lines()
+        assert len(one.places.probes["rim"].place) > 4
+        assert one.places.probes["both"].stress[0, 1] == pytest.approx(-25)
+        assert np.isnan(one.places.probes["middle"].stress).all()
+    (line,) = solution.places.probes["middle"].lines()
     assert line == "at (0.51, 0): pressure (25)"
     assert (
         "2 further places"
-        in list(solution.probes["rim"].lines(len(solution.probes["rim"].place) - 2))[-1]
+        in list(solution.places.probes["rim"].lines(len(solution.places.probes["rim"].place) - 2))[
+            -1
+        ]
     )
 
 
@@ -77,9 +79,9 @@ def test_a_recovered_pressure_is_read_within_its_macro_element():
     zone, plain = exact.zones[0], solved(load)
     owner = np.abs(zone.centre[:, 0] - 0.51).argmin(keepdims=True)
     linear = zone.recovered.values(zone.multiplier, owner, np.array([[[0.51, 0.0]]]))[0, 0]
-    assert exact.probes["middle"].pressure[0] == pytest.approx(linear, rel=1e-12)
+    assert exact.places.probes["middle"].pressure[0] == pytest.approx(linear, rel=1e-12)
     assert abs(linear - zone.multiplier[owner[0]]) > 0.01
-    assert plain.probes["middle"].pressure[0] == plain.zones[0].multiplier[owner[0]]
+    assert plain.places.probes["middle"].pressure[0] == plain.zones[0].multiplier[owner[0]]
 
 
 @pytest.mark.parametrize(

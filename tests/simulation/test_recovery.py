@@ -134,10 +134,10 @@ def test_linear_cells_gain_by_a_smooth_pressure(swapped):
 
 def test_the_correction_balances_in_force_and_moment():
     solution = solved(waves("TRIA6", "QUAD8", 10, "linear"))
-    found = {key: value for key, value in solution.balance.items() if "correction" in key}
+    found = {key: value for key, value in solution.quality.balance.items() if "correction" in key}
     assert len(found) == 2
     assert max(found.values()) < 1e-14
-    assert max(solution.balance.values()) < 1e-11
+    assert max(solution.quality.balance.values()) < 1e-11
 
 
 def test_each_mean_is_kept():
@@ -324,10 +324,16 @@ def test_the_recovery_asked_for_takes_the_place_of_the_cases_own(tmp_path):
     assert [given.record["job"], asked.record["job"]] == ["recovered", "recovered-linear"]
     # The tolerance is of the case's own recovery; the errors of the other one are measured.
     assert [given.record["verdict"], asked.record["verdict"]] == ["passed", "solved"]
-    assert asked.outcome.errors["pressure_l2"] < 0.1 * given.outcome.errors["pressure_l2"]
+    assert (
+        asked.outcome.estimates.errors["pressure_l2"]
+        < 0.1 * given.outcome.estimates.errors["pressure_l2"]
+    )
     own = solve_case(case, recovery="none").record
     assert (own["verdict"], own["checks"]) == ("passed", given.record["checks"])
-    estimates = [given.outcome.pressure_error_estimate, asked.outcome.pressure_error_estimate]
+    estimates = [
+        given.outcome.estimates.pressure_error_estimate,
+        asked.outcome.estimates.pressure_error_estimate,
+    ]
     assert estimates == pytest.approx([0.0116] * 2, rel=0.05)
     assert "pressure within 1.2 % (estimated)" in str(given)
     assert main(["solve", str(case), "--recovery", "linear", "-o", str(tmp_path / "r.vtkhdf")]) == 0

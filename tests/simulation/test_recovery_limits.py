@@ -98,7 +98,7 @@ def test_multigrid_in_place_of_a_factor(monkeypatch):
     factored = found()
     monkeypatch.setattr(choice, "MULTIGRID_FROM", 0)
     iterated = found()
-    assert factored.linear_solver != iterated.linear_solver
+    assert factored.cost.linear_solver != iterated.cost.linear_solver
     one, other = factored.zones[0].recovered, iterated.zones[0].recovered
     assert other.at_nodes == pytest.approx(one.at_nodes, rel=1e-4)
     assert iterated.steps[0].residual < 1e-12

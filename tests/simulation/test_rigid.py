@@ -125,13 +125,13 @@ def test_each_step_has_factors_of_its_own():
     found = [step.rigid[0].force[1] for step in solution.steps]
     assert found == pytest.approx([0.5 * STIFF * 0.01, 2 * STIFF * 0.01, 0.0], abs=1e-12)
     assert solution.steps[1].rigid[0].translation == pytest.approx([2.0, -0.04])
-    assert solution.validity.slip < 0.1  # a plane is the same all over
+    assert solution.quality.validity.slip < 0.1  # a plane is the same all over
 
 
 def test_a_large_rotation_is_noticed():
     turned = case(("move: {y: -0.02}", "move: {y: 0.3, rz: 0.2}"))
     solution = simulate(turned, block_mesh("QUAD4", "QUAD4", (1, 1)))
-    assert solution.validity.rotation == pytest.approx(0.2)
+    assert solution.quality.validity.rotation == pytest.approx(0.2)
 
 
 RING = """\
@@ -220,7 +220,7 @@ def test_a_vector_of_the_plane_is_refused_in_space():
 
 def test_moments_are_about_the_reference_point():
     solution = simulate(case(), block_mesh("QUAD4", "QUAD4", (1, 1)))
-    assert judge(solution, []).forces[-1].name == "floor, about its reference point"
+    assert judge(solution, []).values.forces[-1].name == "floor, about its reference point"
 
 
 def test_other_codes_are_given_no_such_bodies():

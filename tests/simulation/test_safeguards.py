@@ -82,7 +82,7 @@ def test_without_local_coordinates_moments_are_lost_far_from_the_origin(dim):
     # One sum of few terms may be exact by luck, three hardly.
     far = [with_points(mesh, mesh.points + 1e8 / part) for part in (3, 7, 11)]
     held, lost = (
-        max(max(simulate(case, m, options=options).balance.values()) for m in far)
+        max(max(simulate(case, m, options=options).quality.balance.values()) for m in far)
         for options in (Options(), without("local_coordinates"))
     )
     assert held < 1e-13
@@ -95,14 +95,14 @@ def test_without_local_coordinates_moments_are_lost_far_from_the_origin(dim):
 def test_the_estimate_bounds_the_error_and_not_by_much(dim, scene):
     found = patch_solution(dim, **scene(dim))
     error = np.abs(found.zones[0].multiplier / 25.0 - 1).max()
-    assert error < max(found.accuracy.values()) < 1e3 * max(error, EPSILON)
+    assert error < max(found.quality.accuracy.values()) < 1e3 * max(error, EPSILON)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_unreliable_where_coordinates_leave_no_digits_and_only_there(dim):
     """Turned and 10¹² blocks away the stored coordinates are off by 10⁻⁴ of a block."""
     near = patch_solution(dim, move=lambda x: x @ turn(dim, 1.1).T)
-    assert max(near.accuracy.values()) < 1e-11
+    assert max(near.quality.accuracy.values()) < 1e-11
     assert judge(near, []).verdict == "solved"
     verdict = judge(patch_solution(dim, move=lambda x: x @ turn(dim, 1.1).T + 1e12), [])
     assert verdict.verdict == "unreliable"

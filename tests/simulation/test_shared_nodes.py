@@ -76,7 +76,7 @@ def test_corner_with_multigrid():
     text = (CASES / "shared/corner-hexa8-tetra4.yaml").read_text(encoding="utf-8")
     with force_solver("multigrid"):
         solution = solved(text)
-    assert "multigrid" in solution.linear_solver
+    assert "multigrid" in solution.cost.linear_solver
     for zone, pressure in zip(solution.zones, (10.0, 15.0, 25.0), strict=True):
         assert np.abs(zone.multiplier / pressure - 1).max() < 1e-12
 

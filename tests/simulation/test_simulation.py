@@ -90,7 +90,7 @@ def test_several_zones_carry_the_patch_together():
         assert [zone.name for zone in solution.zones] == ["a", "b"]
         carried = sum(zone.multiplier @ zone.area for zone in solution.zones)
         assert carried == pytest.approx(25.0, rel=1e-12)
-        assert max(solution.balance.values()) < 1e-12
+        assert max(solution.quality.balance.values()) < 1e-12
 
 
 @pytest.mark.parametrize("cells", ["HEXA8", "HEXA20", "TETRA10"])
@@ -198,14 +198,14 @@ def test_a_symmetry_plane_of_any_direction_holds_as_an_axis_does():
     case = changed_case(3, normal=True)
     solution = simulate(case, with_points(mesh, mesh.points @ turn(3, 0.7).T))
     assert solution.zones[0].multiplier == pytest.approx(np.full(9, 25.0), rel=1e-12)
-    assert solution.nodal_normal_stress == pytest.approx(
+    assert solution.fields.normal_stress == pytest.approx(
         np.full(len(solution.stress), -25.0), rel=1e-11
     )
 
 
 def test_force_on_the_bodies_is_balanced():
     solution = simulate(block_case(3), block_mesh("TETRA4", "HEXA27"))
-    assert set(solution.balance) >= {"zone interface: force", "reactions and loads: moment"}
+    assert set(solution.quality.balance) >= {"zone interface: force", "reactions and loads: moment"}
     assert errors(solution)["balance"] < 1e-13
 
 
@@ -215,6 +215,8 @@ def test_a_solution_knows_the_nodes_of_supports_and_loads():
     base = solution.case.supports.index(
         next(s for s in solution.case.supports if s.group == "base")
     )
-    assert set(solution.acted[f"supports[{base}].group"]) == set(np.flatnonzero(y == y.min()))
-    assert set(solution.acted["loads[0].group"]) == set(np.flatnonzero(y == y.max()))
-    assert len(solution.acted["loads[0].group"]) == 2 * 3 + 1  # mid-nodes too
+    assert set(solution.places.acted[f"supports[{base}].group"]) == set(
+        np.flatnonzero(y == y.min())
+    )
+    assert set(solution.places.acted["loads[0].group"]) == set(np.flatnonzero(y == y.max()))
+    assert len(solution.places.acted["loads[0].group"]) == 2 * 3 + 1  # mid-nodes too

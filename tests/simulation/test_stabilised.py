@@ -77,7 +77,7 @@ def test_a_fine_stiff_slave():
     for young in (1e4, 1e7):
         given = STIFF | {"top": ("QUAD4", 4), "young": (young, 1e3)}
         found = solve_case(waves(**given, stabilised=True))
-        assert found.solution.iterations == 1
+        assert found.solution.cost.iterations == 1
         assert jump(found) < 0.03
         assert np.abs(deviation(found)).max() < 0.05
 
@@ -114,8 +114,8 @@ def check_like_a_factor(case, poisson, close):
     for kind in ("multigrid", "auto"):
         with force_solver(kind):
             found.append(solve_case(case).solution)
-    assert [("multigrid" in solution.linear_solver) for solution in found] == [True, False]
-    assert found[0].iterations > 1
+    assert [("multigrid" in solution.cost.linear_solver) for solution in found] == [True, False]
+    assert found[0].cost.iterations > 1
     one, other = (solution.zones[0] for solution in found)
     assert 0 < one.closed.sum() < len(one.closed)
     assert (one.closed == other.closed).all()

@@ -138,7 +138,7 @@ def test_forces_of_every_step_also_stored(unloaded, tmp_path):
             assert contact.area[0] == pytest.approx(1)
             assert base.force == pytest.approx([0, p], abs=1e-11)
         assert one.reactions == one.steps[-1].reactions
-    rows = judge(unloaded, []).forces
+    rows = judge(unloaded, []).values.forces
     assert [(r.step, r.name) for r in rows[:4]] == [
         (1, "zone zone"), (1, "base"), (1, "symx"), (2, "zone zone")]  # fmt: skip
     assert rows[3].force == pytest.approx([0, -75])
@@ -146,10 +146,10 @@ def test_forces_of_every_step_also_stored(unloaded, tmp_path):
 
 def test_reactions_at_nodes_sum_to_the_resultants():
     solution, _ = solved(CASE + "steps: [{press: 1, weight: 1}]\n")
-    assert solution.reaction.sum(axis=0) == pytest.approx([0, 33], abs=1e-10)
+    assert solution.fields.reaction.sum(axis=0) == pytest.approx([0, 33], abs=1e-10)
     low = solution.mesh.points[:, 1] == -1
-    assert solution.reaction[low, 1].sum() == pytest.approx(33)
-    assert np.abs(solution.reaction[~low, 1]).max() < 1e-10
+    assert solution.fields.reaction[low, 1].sum() == pytest.approx(33)
+    assert np.abs(solution.fields.reaction[~low, 1]).max() < 1e-10
 
 
 def test_what_is_left_after_unloading_is_compared_with_the_largest_step(unloaded):

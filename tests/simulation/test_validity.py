@@ -67,21 +67,21 @@ def test_slip_over_the_size_of_a_face(along, noted, unreliable, treatment, tmp_p
     """The upper block moves along x as a whole, slave faces are 0.5 long; then it is at rest."""
     text = CASE.replace("master: under", f"master: under, treatment: {treatment}")
     found = solved(text, ALONG=str(along))
-    assert found.validity.slip == pytest.approx(abs(along) / 0.5, rel=1e-12)
-    assert found.validity.strain == pytest.approx(0.0005, rel=1e-12)
+    assert found.quality.validity.slip == pytest.approx(abs(along) / 0.5, rel=1e-12)
+    assert found.quality.validity.strain == pytest.approx(0.0005, rel=1e-12)
     assert ("contact slides by up to" in lines(found)) == noted
     write_result(tmp_path / "r.vtkhdf", found, [], {})
     for solution in (found, read_result(tmp_path / "r.vtkhdf").solution):
         verdict = judge(solution, [])
         assert (verdict.verdict == "unreliable") == unreliable
         assert ("contact slides by 1.2 of a face" in verdict.reason) == unreliable
-        assert verdict.slip == found.validity.slip
+        assert verdict.estimates.validity.slip == found.quality.validity.slip
 
 
 def test_closing_is_no_slip(monkeypatch):
     """A gap of 0.6, more than a face, is closed along the normal."""
     given = {"LOW": "0.6", "HIGH": "1.6", "DOWN": "-0.601", "ALONG": "0.0"}
-    assert solved(**given).validity.slip < 1e-12
+    assert solved(**given).quality.validity.slip < 1e-12
     monkeypatch.setattr(validity, "_slip", lambda *_: 1.2)
     assert judge(solved(**given), []).verdict == "unreliable"
 
@@ -90,9 +90,9 @@ def test_closing_is_no_slip(monkeypatch):
 def test_a_master_that_ends_inside_a_macro_element(wide, partly):
     """Slave faces end at 0.5, 1 and 1.5."""
     found = solved(WIDE=wide, ALONG="0.0")
-    assert found.validity.partly_covered == partly
+    assert found.quality.validity.partly_covered == partly
     assert ("the master ends inside 1 macro-elements" in lines(found)) == bool(partly)
-    assert judge(found, []).partly_covered == partly
+    assert judge(found, []).estimates.validity.partly_covered == partly
 
 
 @pytest.mark.parametrize(("down", "inside"), [("-0.3", 0), ("-0.85", 7)])
@@ -105,7 +105,7 @@ def test_bodies_pushed_past_each_other(down, inside):
     start = CASE.index("contact:")
     text = CASE[:start] + CASE[CASE.index("steps:") :]
     found = solved(text, LOW="0.2", HIGH="1.2", DOWN=down, ALONG="0.01")
-    assert found.validity.pushed_past == inside
+    assert found.quality.validity.pushed_past == inside
     verdict = judge(found, [])
     assert (verdict.verdict == "unreliable") == bool(inside)
     assert ("7 cells have their middle inside another body" in verdict.reason) == bool(inside)
@@ -163,7 +163,7 @@ def test_a_clearance_is_where_bodies_are_and_not_their_mesh():
     )
     assert found.pressure == pytest.approx(25.0, rel=1e-9)
     assert found.verdict == "solved"
-    assert found.solution.validity.pushed_past == 0
+    assert found.solution.quality.validity.pushed_past == 0
 
 
 FITTED = """\
@@ -213,7 +213,7 @@ def test_facets_that_overlap_end_beside_each_other_on_a_plane_of_symmetry(lost, 
     judged = judge(solution, checks)
     assert judged.verdict == verdict, judged.reason
     assert next(c.passed for c in checks if c.name == "coverage") == (not lost)
-    assert min(judged.coverage) < 1 - 1e-4
+    assert min(judged.values.coverage) < 1 - 1e-4
 
 
 def test_the_flank_of_a_rounding_needs_no_partner():
@@ -235,4 +235,4 @@ def test_the_flank_of_a_rounding_needs_no_partner():
     found = scenes.solved(text, mesh)
     assert len(found.zones[0].area) == 20
     assert found.zones[0].coverage.min() == 0
-    assert found.validity.unpaired == 0
+    assert found.quality.validity.unpaired == 0

@@ -20,7 +20,7 @@ MANUFACTURED = Path(__file__).parents[2] / "cases" / "manufactured"
 def solved(case):
     """Size of the macro-elements, and errors, of a case."""
     solution = simulate(case, mesh_of(case))
-    return {"size": element_size(solution.macro_elements, 2)} | errors(solution)
+    return {"size": element_size(solution.cost.macro_elements, 2)} | errors(solution)
 
 
 @pytest.mark.parametrize(

@@ -89,9 +89,16 @@ def field(name, index, value):
     return spoil
 
 
+def normal(index, value):
+    def spoil(solution):
+        solution.fields.normal_stress[index] = value
+
+    return spoil
+
+
 def balance(name, value):
     def spoil(solution):
-        solution.balance[name] = value
+        solution.quality.balance[name] = value
 
     return spoil
 
@@ -124,8 +131,8 @@ NAN = float("nan")
         (zone_array("stress_slave", 3, 25.0), {"surface_stress_slave"}),
         (zone_array("stress_slave", 3, NAN), {"surface_stress_slave"}),
         (zone_array("stress_master", 0, -25.03), {"surface_stress_master"}),
-        (field("nodal_normal_stress", 20, -24.9), {"nodal_stress"}),
-        (field("nodal_normal_stress", 0, NAN), {"nodal_stress"}),
+        (normal(20, -24.9), {"nodal_stress"}),
+        (normal(0, NAN), {"nodal_stress"}),
         (field("displacement", (5, 0), 0.1), {"displacement", "integration_stress"}),
         (field("displacement", (21, 1), 1.1375), {"displacement", "integration_stress"}),
         (field("displacement", (3, 1), NAN), {"displacement", "integration_stress"}),
@@ -185,7 +192,7 @@ def test_a_failure_says_where_and_by_how_much(solution):
 
 
 def test_nothing_to_check_is_no_success(solution):
-    solution.balance = {}
+    solution.quality.balance = {}
     solution.zones[0].stress_slave = np.empty(0)
     solution.zones[0].slave_nodes = np.empty(0, int)
     assert failing(solution) == {"balance", "surface_stress_slave"}

@@ -62,7 +62,7 @@ def test_a_change_fails_until_it_is_accepted_and_changes_one_line(solution):
     accept(solution, checked(solution))
     path = regression_file(solution)
     before = path.read_text().splitlines()
-    solution.nodal_normal_stress[0] = -25.0001
+    solution.fields.normal_stress[0] = -25.0001
     check = next(check for check in checked(solution) if check.name == "nodal_stress")
     assert not check.passed
     assert check.regression.change == pytest.approx(4e-6)

@@ -72,7 +72,7 @@ def test_zones_that_share_a_cell_type_come_back_apart(tmp_path):
     second = deepcopy(solution.zones[0])
     second.name, second.faces = "second", [("TRIA3", np.array([[8, 9, 10]]), np.array([1]))]
     solution.zones.append(second)
-    solution.balance["zone second: force"] = 0.0
+    solution.quality.balance["zone second: force"] = 0.0
     add = "contact: [{name: second, slave: a, master: b}, "
     retold(solution, "contact: [", add)
     path = tmp_path / "result.vtkhdf"

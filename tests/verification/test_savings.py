@@ -8,7 +8,7 @@ import pytest
 from solver.simulation.options import LEAN, Options
 from solver.verification import savings
 from solver.verification.run import Job, solve
-from solver.verification.verdict import write_verdict
+from solver.verification.stored import write_verdict
 from tests.workflow.projects import write_case
 
 
@@ -25,7 +25,7 @@ def family(tmp_path_factory):
             shutil.copytree(first, folder / str(number))
         plan = verdict.plan if number < 6 else [["linear solver", "CHOLMOD", ""]]
         plan = [line for line in plan if number < 6 or not line[2]]
-        changed = replace(verdict, cpu_seconds=number + 1.0, plan=plan)
+        changed = replace(verdict, cost=replace(verdict.cost, cpu_seconds=number + 1.0), plan=plan)
         write_verdict(folder / str(number) / "verdict.json", changed)
     return folder
 

@@ -242,7 +242,7 @@ def test_the_change_by_facets_is_about_the_error(inner, outer, error):
     found = solve_case(rings(inner, outer, "bottom", interference))
     true = np.linalg.norm(found.pressure / (FIT * interference) - 1) / np.sqrt(len(found.pressure))
     assert true == pytest.approx(error, rel=0.1)
-    assert found.solution.validity.facets == pytest.approx(true, rel=0.25)
+    assert found.solution.quality.validity.facets == pytest.approx(true, rel=0.25)
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(7, 5), (8, 10), (9, 13), (6, 12), (12, 6)])

@@ -8,9 +8,11 @@ import pytest
 
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
+from solver.verification.flat import to_json
 from solver.verification.judge import judge, without_result
 from solver.verification.results import write_result
-from solver.verification.verdict import Verdict, read_verdict, to_json, unbound, write_verdict
+from solver.verification.stored import read_verdict, unbound, write_verdict
+from solver.verification.verdict import Problem, Verdict
 from tests.handmade import PLANE, plane, solid
 
 CONTRACT = {
@@ -78,20 +80,20 @@ def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):
 
 def test_a_result_without_digits_is_unreliable_though_its_checks_hold(tmp_path):
     solution = plane(tmp_path)
-    solution.accuracy = {"forces": 1e-9, "gap": 2e-4}
+    solution.quality.accuracy = {"forces": 1e-9, "gap": 2e-4}
     verdict = verdict_of(solution)
     assert (verdict["verdict"], verdict["passed"]) == ("unreliable", False)
     assert verdict["reason"].startswith("rounding alone may change")
     assert "the gap is lost" in verdict["reason"]
     assert verdict["attainable"] == 2e-4
-    solution.accuracy = {"forces": 1e-9, "gap": 9e-5}
+    solution.quality.accuracy = {"forces": 1e-9, "gap": 9e-5}
     assert verdict_of(solution)["verdict"] == "passed"
 
 
 def test_what_is_not_a_number_is_null_and_fails(tmp_path):
     solution = plane(tmp_path)
     solution.zones[0].multiplier[0] = np.nan
-    solution.cpu_seconds = float("inf")
+    solution.cost.cpu_seconds = float("inf")
     verdict = strict(to_json(verdict_of(solution)))
     assert verdict["verdict"] == "failed"
     assert verdict["pressure"] == [None, None]
@@ -119,12 +121,12 @@ def test_a_solve_without_an_end_has_the_same_keys(tmp_path, word):
 
 def test_a_case_file_that_cannot_be_read_is_known_by_its_path(tmp_path):
     verdict = without_result("refused", "no YAML", tmp_path / "mine.yaml")
-    assert (verdict.case, verdict.family) == ("mine", tmp_path.name)
+    assert (verdict.problem.case, verdict.problem.family) == ("mine", tmp_path.name)
 
 
 def test_the_file_is_strict_json_and_gives_the_verdict_back(tmp_path):
     solution, path = plane(tmp_path), tmp_path / "results" / "verdict.json"
-    solution.cpu_seconds, solution.zones[0].gap[0] = np.float64(2), np.nan
+    solution.cost.cpu_seconds, solution.zones[0].gap[0] = np.float64(2), np.nan
     verdict = judge(solution, run_checks(solution))
     write_verdict(path, verdict)
     told = strict(path.read_text())
@@ -134,10 +136,11 @@ def test_the_file_is_strict_json_and_gives_the_verdict_back(tmp_path):
 
 def test_a_verdict_that_cannot_be_written_leaves_the_old_one(tmp_path):
     path = tmp_path / "verdict.json"
-    write_verdict(path, Verdict(family="f", job="j", verdict="passed"))
+    problem = Problem(family="f", job="j")
+    write_verdict(path, Verdict(problem=problem, verdict="passed"))
     before = path.read_bytes()
     with pytest.raises(TypeError):
-        write_verdict(path, Verdict(family="f", job="j", verdict="passed", reason=object()))
+        write_verdict(path, Verdict(problem=problem, verdict="passed", reason=object()))
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -162,7 +165,7 @@ def test_without_a_reference_a_solve_is_solved_and_not_verified(tmp_path):
     counts = "counts: {bottom: {cells: 2}}\n"
     solution = plane(tmp_path, PLANE[: PLANE.index("reference")] + counts)
     assert judge(solution, run_checks(solution)).verdict == "solved"
-    solution.balance["reactions: moment"] = 1.0
+    solution.quality.balance["reactions: moment"] = 1.0
     assert judge(solution, run_checks(solution)).verdict == "failed"
 
 

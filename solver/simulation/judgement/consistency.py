@@ -38,7 +38,7 @@ def _all(solution: Solution) -> Iterator[str]:
     for name, values in _numbers("", solution):
         if not np.isfinite(values).all():
             yield f"{name} holds values that are not finite numbers"
-    balanced = {name.rpartition(": ")[0] for name in solution.balance}
+    balanced = {name.rpartition(": ")[0] for name in solution.quality.balance}
     zones = [f"zone {zone.name}" for zone in solution.zones]
     for name in (*zones, "reactions and loads", "free nodes"):
         if name not in balanced:
@@ -74,7 +74,7 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     dim = 3 if solution.case.axisymmetric else moved.shape[1]
     smallest = float(zone.area.min()) ** (1 / (dim - 1))
     error = round_off * young * float(np.abs(moved).max()) / smallest
-    error += max(solution.accuracy.values(), default=0.0) * largest
+    error += max(solution.quality.accuracy.values(), default=0.0) * largest
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"

@@ -20,7 +20,8 @@ from ...mechanics.fem.stress import largest_strain
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
-from ..results.solution import Line, Validity
+from ..results.records import Validity
+from ..results.solution import Line
 from ..scene.scene import Scene, ZoneScene
 from .facet_gaps import facets_of
 
@@ -150,28 +151,23 @@ OF_PRESSURE = (
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
     scene, facets = problem.scene, facets_of(problem, states[-1])
-    found, solid = Validity(strain=0.0, rotation=0.0, slip=0.0), meshed(scene)
-    apart = _apart(scene)
+    solid, apart, found = meshed(scene), _apart(scene), []
     for state in states:
         moved, closed = state.displacement, state.status.closed
         strain, rotation = largest_strain(scene.points, scene.blocks, moved)
-        slips = [
-            found.slip,
-            *(_slip(scene, z, moved, closed) for z in scene.zones if _bent(z, scene)),
-        ]
-        past = inside_others(scene.points + moved, solid, scene.body, apart)
-        partly = sum(_partly_covered(zone, closed) for zone in scene.zones)
-        found = Validity(
-            strain=max(found.strain, strain),
-            rotation=max(found.rotation, rotation, _turn(scene, moved)),
-            slip=max(slips),
-            pushed_past=max(found.pushed_past, past),
-            partly_covered=max(found.partly_covered, partly),
-            unpaired=max([found.unpaired, *(_unpaired(zone, closed) for zone in scene.zones)]),
+        slips = (_slip(scene, z, moved, closed) for z in scene.zones if _bent(z, scene))
+        one = Validity(
+            strain=strain,
+            rotation=max(rotation, _turn(scene, moved)),
+            slip=max(slips, default=0.0),
+            pushed_past=inside_others(scene.points + moved, solid, scene.body, apart),
+            partly_covered=sum(_partly_covered(zone, closed) for zone in scene.zones),
+            unpaired=max((_unpaired(zone, closed) for zone in scene.zones), default=0.0),
             facets=facets.pressure,
             facet_depth=facets.depth,
         )
-    return found
+        found.append(one)
+    return Validity.worst(found)
 
 
 def _apart(scene: Scene) -> np.ndarray:

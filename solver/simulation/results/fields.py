@@ -44,11 +44,11 @@ def grid_fields(solution: Solution) -> tuple[dict[str, np.ndarray], dict[str, np
     point_data = {
         "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
         "stress": solution.stress,
-        "normal_stress": solution.nodal_normal_stress,
+        "normal_stress": solution.fields.normal_stress,
         "body": solution.body,
     }
     for name in ("reaction", "motion"):
-        if (vectors := getattr(solution, name)) is not None:
+        if (vectors := getattr(solution.fields, name)) is not None:
             point_data[name] = np.pad(vectors, ((0, 0), (0, 3 - dim)))
     if any(zone.recovered for zone in solution.zones):
         point_data["recovered_pressure"] = _recovered_at_nodes(solution)

@@ -28,6 +28,7 @@ from .balance import (
 )
 from .exact import pressure_on
 from .forces import ProbeResult
+from .records import Cost, Fields, Places, Quality, Scalars
 from .solution import (
     BodyInfo,
     Line,
@@ -72,24 +73,23 @@ def solution_of(
         body=scene.body,
         bodies=body_infos(scene),
         zones=zones,
-        nodal_normal_stress=normal_stress(stress, _contact_direction(scene)),
-        balance=imbalances(scene, last),
         steps=steps,
-        length=scene.length,
-        load_scale=scale,
-        dofs=scene.n_dofs,
-        macro_elements=sum(zone.count for zone in scene.zones),
-        iterations=sum(state.status.iterations for state in states),
-        linear_solver=problem.linear_solver,
-        linear_iterations=problem.linear_iterations,
-        matrix_entries=problem.matrix.nnz,
         plan=plan,
-        strain_energy=strain_energy(last),
-        reaction=at_nodes,
-        probes=probed(scene, zones, last.displacement, stress) if scene.case.probes else {},
-        acted=scene.acted,
-        accuracy=last.accuracy.causes,
-        mean_stress=mean_stress,
+        scalars=Scalars(scene.length, scale, strain_energy(last)),
+        fields=Fields(normal_stress(stress, _contact_direction(scene)), at_nodes, mean_stress),
+        cost=Cost(
+            dofs=scene.n_dofs,
+            macro_elements=sum(zone.count for zone in scene.zones),
+            iterations=sum(state.status.iterations for state in states),
+            linear_solver=problem.linear_solver,
+            linear_iterations=problem.linear_iterations,
+            matrix_entries=problem.matrix.nnz,
+        ),
+        quality=Quality(balance=imbalances(scene, last), accuracy=last.accuracy.causes),
+        places=Places(
+            probed(scene, zones, last.displacement, stress) if scene.case.probes else {},
+            scene.acted,
+        ),
     )
 
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...case.model import job_name
-from .forces import ProbeResult, Reaction, Resultants, RigidMotion
+from .forces import Reaction, Resultants, RigidMotion
+from .records import Cost, Fields, Places, Quality, Scalars
 
 if TYPE_CHECKING:
     import meshio
@@ -190,28 +191,6 @@ def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
 
 
 @dataclass
-class Validity:
-    """How far a solve is from what it takes for granted, the largest of all load steps.
-
-    `strain` (principal) and `rotation` (radians), in the middle of the cells; `slip` of closed
-    contact, a mean over the macro-element, by its size; `pushed_past`: how many cells are inside
-    another body; `partly_covered`: how many closed macro-elements are under the master's end;
-    `unpaired`: the largest share of one, closed or bare, opposite the master but in no segment;
-    `facets`, `facet_depth`: what facets of curved surfaces do in the last step, as the share of the
-    pressure that they change and their depth by the elastic closing of the contact.
-    """
-
-    strain: float = float("nan")
-    rotation: float = float("nan")
-    slip: float = float("nan")
-    pushed_past: int = 0
-    partly_covered: int = 0
-    unpaired: float = 0.0
-    facets: float = 0.0
-    facet_depth: float = 0.0
-
-
-@dataclass
 class StepResult:
     """One load step: load factor, cost of the status iteration, and what was observed.
 
@@ -262,24 +241,10 @@ class Solution:
 
     `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement` (n,
     dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body,
-    `body` (n,). `nodal_normal_stress` (n,) is d·σ·d with d the mean slave normal of the first zone.
-    `balance` names relative imbalances (of forces and moments, relative to the load). `length` is
-    the largest extent of the mesh, `load_scale` the largest pressure of the load or else the
-    largest stress. `validity`: see there.
-    `accuracy` are the relative errors that rounding alone may cause, by cause (see
-    `equilibrium.state`). `mean_stress` holds, by cell type, the stress s of cells in mixed
-    form at their nodes (n_cells, n_nodes), NaN in other cells (see `solver.mechanics.fem.mixed`).
-    `strain_energy` is that of the last load factor, and so is `reaction` (n, dim), the forces at
-    nodes with which supports, rigid bodies, springs and ties hold the bodies; `probes` by name.
-    `acted`: nodes by the key of the support, or of the load on a surface.
-    `errors` are the norms of `solver.verification.norms` where the case names an exact solution.
+    `body` (n,).
     Where bodies may move far, `mesh` is where the last step brought them, `displacement` is what
-    they have beside their `motion` (n, dim), and `earlier` has the positions of the steps before.
+    they have beside the `motion` in `fields`, and `earlier` has the positions of the steps before.
     `ended`: why the step after the last one has no solution; `case` then has the steps before.
-    `matrix_entries`: those of the stiffness on the free unknowns, both halves; `linear_iterations`
-    the most that one solution of the linear system took, 0 by a factor alone. `seconds` and
-    `stage_cpu_seconds` are wall and processor time by stage, `peak_memory_mb` the process's largest
-    resident size.
     """
 
     case: Case
@@ -289,33 +254,15 @@ class Solution:
     body: np.ndarray
     bodies: list[BodyInfo]
     zones: list[ZoneResult]
-    nodal_normal_stress: np.ndarray
-    balance: dict[str, float]
     steps: list[StepResult]
-    length: float
-    load_scale: float
-    dofs: int
-    macro_elements: int
-    iterations: int
-    linear_solver: str
     plan: list[Line]
-    matrix_entries: int = 0
-    linear_iterations: int = 0
-    validity: Validity = field(default_factory=Validity)
-    strain_energy: float | None = None
-    reaction: np.ndarray | None = None
-    probes: dict[str, ProbeResult] = field(default_factory=dict)
-    acted: dict[str, np.ndarray] = field(default_factory=dict)
-    accuracy: dict[str, float] = field(default_factory=dict)
-    mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
-    errors: dict[str, float] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
-    cpu_seconds: float = float("nan")
-    peak_memory_mb: float = float("nan")
-    ended: str = ""
-    motion: np.ndarray | None = None
+    scalars: Scalars
+    fields: Fields
+    cost: Cost = field(default_factory=Cost)
+    quality: Quality = field(default_factory=Quality)
+    places: Places = field(default_factory=Places)
     earlier: list[Position] = field(default_factory=list)
+    ended: str = ""
 
     @property
     def swapped(self) -> bool:

@@ -106,7 +106,7 @@ def test_quadratic_slave_nodes_may_be_held():
 def test_a_node_to_segment_multiplier_between_held_nodes_is_left_out():
     solution = held_at_a_side("node_to_segment", block_mesh("QUAD4", "QUAD4", (4, 4)))
     assert "interface: 1 multipliers left out" in [line.what for line in solution.plan]
-    assert solution.balance["free nodes: force"] < 1e-14
+    assert solution.quality.balance["free nodes: force"] < 1e-14
 
 
 def test_multipliers_that_depend_on_one_another_are_refused_with_the_reason():

@@ -90,7 +90,7 @@ def iterations_on_a_sphere(cells: str = "HEXA20") -> int:
     text = replaced((ROOT / "cases/hertz/sphere-tetra10.yaml").read_text(), ("TETRA10", cells))
     with force_solver("multigrid"):
         solution = solved(text)
-    return solution.linear_iterations if "multigrid" in solution.linear_solver else 150
+    return solution.cost.linear_iterations if "multigrid" in solution.cost.linear_solver else 150
 
 
 def test_graded_quadratic_cells_take_few_iterations(monkeypatch):
