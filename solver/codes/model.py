@@ -101,7 +101,7 @@ class Model:
         from ..case.expressions import evaluate
 
         given, exact = self.case.reference.get("contact_pressure"), self.case.solution
-        centre = zone.operator.surface.centre + self.scene.origin
+        centre = zone.operator.surface.centre + self.scene.coordinates.origin
         if exact is not None and "contact_pressure" in exact.quantities:
             return exact.contact_pressure(centre)
         return None if given is None else evaluate(given, centre)
@@ -114,7 +114,7 @@ class Model:
             name=zone.zone.name,
             faces=[(b.type.name, b.nodes, b.number) for b in zone.slave_faces],
             master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
-            centre=surface.centre + self.scene.origin,
+            centre=surface.centre + self.scene.coordinates.origin,
             normal=surface.normal,
             area=surface.area,
             multiplier=none,

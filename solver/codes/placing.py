@@ -206,7 +206,7 @@ class Placer:
         """Whether places of the interface do not reach over the part of it that is pressed."""
         pressed = []
         for zone in self.model.scene.zones:
-            centre = zone.operator.surface.centre + self.model.scene.origin
+            centre = zone.operator.surface.centre + self.model.scene.coordinates.origin
             pressure = self.model.reference_pressure(zone)
             pressed.append(centre if pressure is None else centre[pressure > 0])
         wanted = np.ptp(np.concatenate(pressed), axis=0)

@@ -97,13 +97,15 @@ def _unmerged(scene: Scene) -> Iterator[InputError]:
     """Nodes of one body at one place without contact between them: an unintended slit."""
     surfaces = [b.nodes.ravel() for z in scene.zones for b in (*z.slave_faces, *z.master_faces)]
     surfaces += [f.nodes.ravel() for z in scene.zones for f in z.sub_faces]
-    pairs = cKDTree(scene.points).query_pairs(ONE_PLACE * scene.length, output_type="ndarray")
+    pairs = cKDTree(scene.points).query_pairs(
+        ONE_PLACE * scene.coordinates.length, output_type="ndarray"
+    )
     within = scene.body[pairs[:, 0]] == scene.body[pairs[:, 1]]
     on_surface = np.isin(pairs, np.concatenate([np.empty(0, dtype=int), *surfaces]))
     loose = pairs[within & ~on_surface.all(axis=1)]
     if len(loose):
         name = body_names(scene)[scene.body[loose[0, 0]]]
-        place = ", ".join(f"{x:.6g}" for x in scene.points[loose[0, 0]] + scene.origin)
+        place = ", ".join(f"{x:.6g}" for x in scene.points[loose[0, 0]] + scene.coordinates.origin)
         allowed = (
             f"{len(loose)} pairs of nodes of {name} are at one "
             f"place and not on a contact surface (the first at ({place})): merge them, or let a "

@@ -188,7 +188,7 @@ def _solution(
                 zone.friction.slip_total = zone.friction.slip + turned
     step.work = float((force * path).sum() / 2)
     for name, probe in found.places.probes.items():
-        moved = place.displacement[problem.scene.probed[name]]
+        moved = place.displacement[problem.scene.named.probed[name]]
         found.places.probes[name] = replace(probe, displacement=moved)
     return found
 

@@ -161,7 +161,7 @@ def floor(
     """
     scene, system = problem.scene, problem.system
     assert system is not None, "nothing has been solved"
-    points = scene.points + scene.origin.astype(np.longdouble)
+    points = scene.points + scene.coordinates.origin.astype(np.longdouble)
     points += carried_over(scene, mesh, misplaced(scene.case, raw, mesh))
     upper = upper_nodes(scene)
     exact = state.displacement(points, upper).ravel()
@@ -175,7 +175,7 @@ def floor(
     for deformation in _roundings(remainder):
         internal = internal_force(scene.points, scene.blocks, deformation, extended=True)
         internal += sum(mean.force(values) for mean, values in mixed)
-        left = scene.free.basis.T @ (scene.force - internal).astype(float).ravel()
+        left = scene.free.basis.T @ (scene.loads.force - internal).astype(float).ravel()
         pressure = system.multiplier(left)
         stress = nodal_stress(scene.points, scene.blocks, deformation, extended=True)
         stress += sum(mean.nodal_stress(values, scene.blocks) for mean, values in mixed)
@@ -281,7 +281,7 @@ def _measured(point: Point, safeguards: Safeguards) -> Record:
         "reason": accuracy.reason,
         "pressure": max(np.abs(z.multiplier / state.pressure - 1).max() for z in zones),
         "stress": stress_error(solution.stress, scene, state),
-        "gap": max(np.abs(z.gap).max() for z in zones) / scene.length,
+        "gap": max(np.abs(z.gap).max() for z in zones) / scene.coordinates.length,
         "force": max(v for k, v in balance.items() if k.endswith("force")),
         "moment": max(v for k, v in balance.items() if k.endswith("moment")),
         "residual": solution.steps[-1].residual,

@@ -62,7 +62,7 @@ def inf_sup_constant(scene: Scene) -> float:
     basis = scene.free.basis
     energy = stiffness(scene.points, scene.blocks)
     energy = sum((part.stiffness for part in scene.parts if part.stiffness is not None), energy)
-    energy = energy + mass(scene.points, scene.blocks) / scene.length**2
+    energy = energy + mass(scene.points, scene.blocks) / scene.coordinates.length**2
     gaps = sparse.vstack([zone.operator.matrix for zone in scene.zones]) @ basis
     area = np.concatenate([zone.operator.area for zone in scene.zones])
     size = area if scene.points.shape[1] == 2 else np.sqrt(area)
@@ -230,7 +230,7 @@ def inf_sup(point: Point) -> Record:
 def profile(point: Point) -> Record:
     """The contact pressure of the first zone along x; `bilateral` contact holds tension too."""
     scene = build_scene(point.case, mesh_of(point.case))
-    place = scene.zones[0].operator.surface.centre[:, 0] + scene.origin[0]
+    place = scene.zones[0].operator.surface.centre[:, 0] + scene.coordinates.origin[0]
     order = np.argsort(place)
     pressure = ContactProblem(scene).solve(1.0, bilateral=point.run.bilateral).pressure
     return {"place": place[order].tolist(), "pressure": pressure[order].tolist()}

@@ -70,7 +70,7 @@ def _springs_at_full_load(true: Any) -> Any:
         force, offset = true(self, step)
         loose = any(isinstance(part, Springs) for part in self.parts)
         loose = loose and not isinstance(step, dict)
-        return (self.force if loose else force), offset
+        return (self.loads.force if loose else force), offset
 
     return acting
 

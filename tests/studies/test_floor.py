@@ -43,7 +43,7 @@ def test_the_exact_state_is_what_the_solver_finds(dim, poisson):
     state = exact_state(case, "compression", raw)
     scene = problem.scene
     upper = upper_nodes(scene)
-    exact = state.displacement(scene.points + scene.origin, upper).astype(float)
+    exact = state.displacement(scene.points + scene.coordinates.origin, upper).astype(float)
     assert found.pressure == pytest.approx(np.full(len(found.pressure), 25.0), rel=1e-11)
     assert found.displacement == pytest.approx(exact, abs=1e-11 * np.abs(exact).max())
     stress = nodal_stress(scene.points, scene.blocks, exact)

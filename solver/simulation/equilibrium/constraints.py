@@ -203,7 +203,7 @@ def refuse_unsolvable(scene: Scene, moves: str, constraints: ContactConstraints)
     for zone in scene.zones:
         mine = _macro_elements(zone, lost)
         if zone.treatment.cut and len(mine):
-            place = zone.operator.surface.centre[mine[0]] + scene.origin
+            place = zone.operator.surface.centre[mine[0]] + scene.coordinates.origin
             at = ", ".join(f"{x:.6g}" for x in place)
             allowed = (
                 f"{len(mine)} macro-elements of zone {zone.zone.name} (the first, number "

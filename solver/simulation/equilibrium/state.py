@@ -140,18 +140,22 @@ def roughness(scene: Scene) -> Roughness:
     tilt, turned, steep = *np.zeros((2, len(points))), []
     for zone in scene.zones:
         for faces in (*zone.slave_faces, *zone.master_faces):
-            np.maximum.at(tilt, faces.nodes, _tilts(points, faces, scene.rounding)[:, None])
+            np.maximum.at(
+                tilt, faces.nodes, _tilts(points, faces, scene.coordinates.rounding)[:, None]
+            )
     if scene.free.selection is None:
         steep, around = steepness(points, scene.blocks), np.zeros(len(points))
         for block, slope in zip(scene.blocks, steep, strict=True):
             np.maximum.at(around, block.cells, slope.sum(axis=1)[:, None])
         entries = scene.free.basis.tocoo()
         node = entries.row[np.bincount(entries.col)[entries.col] > 1] // dim
-        turned[node] = scene.rounding * around[node]
+        turned[node] = scene.coordinates.rounding * around[node]
         largest = float(around.max())
     else:
         largest = steepest(points, scene.blocks)
-    return Roughness(scene.rounding * largest, tilt, turned, steep if turned.any() else [])
+    return Roughness(
+        scene.coordinates.rounding * largest, tilt, turned, steep if turned.any() else []
+    )
 
 
 def _tilts(points: np.ndarray, faces: FaceBlock, noise: float) -> np.ndarray:
@@ -191,7 +195,7 @@ def rounding(iterate: ContactIterate) -> Rounding:
     """The errors by rounding in an iterate."""
     scene, constraints = iterate.scene, iterate.constraints
     terms = sum(term.rounded[0] for term in iterate.terms)
-    known = scene.rounding * constraints.covered * (constraints.initial != 0)
+    known = scene.coordinates.rounding * constraints.covered * (constraints.initial != 0)
     return Rounding(
         forces=_unit(iterate) * iterate.sizes.forces + EPSILON * terms,
         gaps=known + EPSILON * iterate.opening_size,
@@ -217,10 +221,10 @@ def estimate(
     scale = float(np.abs(pressure).max(initial=0.0))
     moved = iterate.displacement.total.reshape(scene.points.shape)
     if scale == 0:
-        if not scene.force.any():
-            caused = stress_of_motion(scene.case, scene.length, moved) * scene.length ** (
-                scene.space - 1
-            )
+        if not scene.loads.force.any():
+            caused = stress_of_motion(
+                scene.case, scene.coordinates.length, moved
+            ) * scene.coordinates.length ** (scene.space - 1)
             force_scale = max(force_scale, caused)
         return Accuracy({"forces": float(forces.max()) / force_scale})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
@@ -238,9 +242,13 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    if max(errors.values()) >= scale and not scene.force.any():
+    if max(errors.values()) >= scale and not scene.loads.force.any():
         # The pressure is rounding: no force acts. The measure is what strains and motions would be.
-        scale = max(scale, iterate.sizes.highest, stress_of_motion(scene.case, scene.length, moved))
+        scale = max(
+            scale,
+            iterate.sizes.highest,
+            stress_of_motion(scene.case, scene.coordinates.length, moved),
+        )
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
@@ -283,7 +291,7 @@ def judged(
         gap=iterate.gap,
         pressure_limit=limit,
         gap_limit=(_NOISE * iterate.opening_size + _NOISE_OF_MOTION * motion) / covered
-        + _ROUNDINGS * scene.rounding * (constraints.initial != 0),
+        + _ROUNDINGS * scene.coordinates.rounding * (constraints.initial != 0),
     )
 
 

@@ -197,7 +197,7 @@ def meshed(scene: Scene) -> dict[str, np.ndarray]:
 def _turn(scene: Scene, moved: np.ndarray) -> float:
     """The largest rotation of a rigid body, in radians."""
     found = [0.0]
-    for frame in scene.rigid.values():
+    for frame in scene.held.rigid.values():
         amount = frame.amount(moved[frame.nodes])
         found.append(float(np.linalg.norm([amount.get(key, 0.0) for key in ("rx", "ry", "rz")])))
     return max(found)

@@ -40,18 +40,22 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
-        stress = stress_of_motion(scene.case, scene.length, state.displacement)
-        scale = max(scale, stress * scene.length ** (scene.space - 1)) or 1.0
+        stress = stress_of_motion(scene.case, scene.coordinates.length, state.displacement)
+        scale = max(scale, stress * scene.coordinates.length ** (scene.space - 1)) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
         by_zone["correction of the pressure"] = state.correction, state.couple
         contact += state.correction
     for name, (forces, own) in by_zone.items():
-        result |= _both(f"zone {name}", points, forces, own, scale, scene.length, around)
+        result |= _both(
+            f"zone {name}", points, forces, own, scale, scene.coordinates.length, around
+        )
     couple = sum((each for _, each in by_zone.values()), np.zeros(3))
     held, free_part = _unbalanced(scene, state, contact)
     whole = held + state.force + _of_ground(state)
-    result |= _both("reactions and loads", points, whole, -couple, scale, scene.length, around)
+    result |= _both(
+        "reactions and loads", points, whole, -couple, scale, scene.coordinates.length, around
+    )
     result["free nodes: force"] = float(np.abs(free_part).max(initial=0.0) / scale)
     return result
 
@@ -75,7 +79,7 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
     left, _ = _unbalanced(scene, state, _contact(scene, state))
     found: dict[str, np.ndarray] = {}
     spanned = np.zeros((*left.shape, left.shape[1]))
-    for fixed in scene.fixed:
+    for fixed in scene.held.fixed:
         nodes, direction = fixed.nodes, fixed.directions
         rest = direction - np.einsum("nij,nj->ni", spanned[nodes], direction)
         size = np.linalg.norm(rest, axis=1, keepdims=True)
@@ -108,7 +112,7 @@ def _contact(scene: Scene, state: Equilibrium) -> np.ndarray:
 def rigid_bodies(scene: Scene, state: Equilibrium) -> list[RigidMotion]:
     """The motion of each rigid body, and the contact force on it."""
     contact, found = _contact(scene, state), []
-    for name, frame in scene.rigid.items():
+    for name, frame in scene.held.rigid.items():
         moved = frame.amount(state.displacement[frame.nodes])
         force = frame.resultant(contact[frame.nodes])
         axes = "xyz"[: contact.shape[1]]
@@ -116,7 +120,7 @@ def rigid_bodies(scene: Scene, state: Equilibrium) -> list[RigidMotion]:
         found.append(
             RigidMotion(
                 body=name,
-                point=frame.point + scene.origin,
+                point=frame.point + scene.coordinates.origin,
                 translation=np.array([moved[axis] for axis in axes]),
                 rotation=turn,
                 force=np.array([force[axis] for axis in axes]),
@@ -143,7 +147,7 @@ def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     """
     if scene.case.axisymmetric:
         return np.zeros(3)
-    place = scene.points[nodes] + scene.origin
+    place = scene.points[nodes] + scene.coordinates.origin
     if place.shape[1] == 3:
         return np.cross(place, force).sum(axis=0)
     turning = place[:, 0] @ force[:, 1] - place[:, 1] @ force[:, 0]
@@ -306,7 +310,7 @@ def _extent(
             ends[number] = nodes
         # Where multipliers belong to nodes, means of macro-elements are no resultants of theirs.
         whole = surface.covered / surface.area * (zone.operator.nodes is None)
-        points = scene.points + scene.origin
+        points = scene.points + scene.coordinates.origin
         around = scene.case.axisymmetric
         at = surface_points(points, [(b.type.name, b.nodes, b.number) for b in zone.slave_faces])
         length = np.bincount(at.macro, at.weight)

@@ -75,7 +75,7 @@ def solution_of(
         zones=zones,
         steps=steps,
         plan=plan,
-        scalars=Scalars(scene.length, scale, strain_energy(last)),
+        scalars=Scalars(scene.coordinates.length, scale, strain_energy(last)),
         fields=Fields(normal_stress(stress, _contact_direction(scene)), at_nodes, mean_stress),
         cost=Cost(
             dofs=scene.n_dofs,
@@ -88,7 +88,7 @@ def solution_of(
         quality=Quality(balance=imbalances(scene, last), accuracy=last.accuracy.causes),
         places=Places(
             probed(scene, zones, last.displacement, stress) if scene.case.probes else {},
-            scene.acted,
+            scene.named.acted,
         ),
     )
 
@@ -117,7 +117,7 @@ def _output_mesh(scene: Scene) -> meshio.Mesh:
         for group, mask in scene.given.groups.items()
         if any(m.any() for m in mask.values())
     }
-    return meshio.Mesh(scene.points + scene.origin, cells, cell_sets=sets)
+    return meshio.Mesh(scene.points + scene.coordinates.origin, cells, cell_sets=sets)
 
 
 def _contact_direction(scene: Scene) -> np.ndarray:
@@ -147,7 +147,7 @@ def _zone_result(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
         master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
-        centre=surface.centre + scene.origin,
+        centre=surface.centre + scene.coordinates.origin,
         normal=surface.normal,
         area=surface.area,
         multiplier=zone.by_macro_element(state.pressure),
@@ -188,7 +188,7 @@ def _recovered_pressure(
         form=field.name,
         coefficients=field.coefficients.reshape(len(pressure), -1),
         degree=field.degree,
-        centre=local.centre + scene.origin,
+        centre=local.centre + scene.coordinates.origin,
         axes=local.axes,
         spread=local.spread,
         nodes=nodes,
@@ -196,7 +196,7 @@ def _recovered_pressure(
     )
     total, count = np.zeros((2, len(nodes)))
     for faces in zone.sub_faces:
-        places = scene.points[faces.nodes] + scene.origin
+        places = scene.points[faces.nodes] + scene.coordinates.origin
         at = np.searchsorted(nodes, faces.nodes)
         np.add.at(total, at, found.values(pressure, faces.macro, places))
         np.add.at(count, at, 1.0)
@@ -221,7 +221,7 @@ def step_results(
         for wanted in scene.case.observe:
             zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
             surface = zone.operator.surface
-            offset = surface.centre + scene.origin - np.array(wanted.nearest)
+            offset = surface.centre + scene.coordinates.origin - np.array(wanted.nearest)
             local = int(np.linalg.norm(offset, axis=1).argmin())
             seen.append(
                 {
@@ -242,7 +242,7 @@ def step_results(
                 iterations=state.status.iterations,
                 status_changes=sum(state.status.changes),
                 residual=state.residual,
-                complementarity=product / (scale * scene.length),
+                complementarity=product / (scale * scene.coordinates.length),
                 observations=seen,
                 resultants={
                     (name := zone.zone.name): resultants(
@@ -251,7 +251,7 @@ def step_results(
                     for zone in scene.zones
                 },
                 reactions=held,
-                rigid=rigid_bodies(scene, state) if scene.rigid else [],
+                rigid=rigid_bodies(scene, state) if scene.held.rigid else [],
                 dissipation=state.friction.dissipation if state.friction else 0.0,
             )
         )
@@ -312,12 +312,12 @@ def probed(
             found[name] = _on_surface(scene, zone, name, places)
             continue
         if probe.group:
-            nodes = scene.probed[name]
+            nodes = scene.named.probed[name]
             moved, tensor = displacement[nodes], stress[nodes]
         else:
             cell = cell_at(scene, name)
             moved, tensor = (cell.weights @ f[cell.nodes][None] for f in (displacement, stress))
-        found[name] = ProbeResult(places + scene.origin, moved, tensor, none)
+        found[name] = ProbeResult(places + scene.coordinates.origin, moved, tensor, none)
     return found
 
 
@@ -327,6 +327,10 @@ def _on_surface(scene: Scene, zone: ZoneResult, name: str, places: np.ndarray) -
     for i, face in enumerate(faces_at(scene, name, faces)):
         owner = zone.faces[face.block][2][face.number]
         at = face.nodes[None], np.array([owner]), face.reference[None]
-        pressure[i] = pressure_on(scene.points + scene.origin, zone, face.type.name, *at)[0, 0]
+        pressure[i] = pressure_on(
+            scene.points + scene.coordinates.origin, zone, face.type.name, *at
+        )[0, 0]
     none = np.full((len(places), 6), np.nan)
-    return ProbeResult(places + scene.origin, none[:, : places.shape[1]], none, pressure)
+    return ProbeResult(
+        places + scene.coordinates.origin, none[:, : places.shape[1]], none, pressure
+    )

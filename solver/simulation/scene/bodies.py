@@ -17,7 +17,8 @@ from scipy.spatial import cKDTree
 from ...lac.motions import rigid_motions, support_resistance, unheld_motion
 from ...mechanics.fem.bodies import joined_bodies, nodes_of_unknowns
 from ...mechanics.fem.supports import FreeMotion
-from .scene import Scene, Unloaded
+from .records import Unloaded
+from .scene import Scene
 
 
 def body_names(scene: Scene) -> list[str]:
@@ -56,7 +57,9 @@ def coincident(scene: Scene) -> dict[tuple[int, int], int]:
         apart[pair] = apart.T[pair] = False
     if not apart.any():
         return {}
-    pairs = cKDTree(scene.points).query_pairs(ONE_PLACE * scene.length, output_type="ndarray")
+    pairs = cKDTree(scene.points).query_pairs(
+        ONE_PLACE * scene.coordinates.length, output_type="ndarray"
+    )
     a, b = np.sort(scene.body[pairs], axis=1).reshape(-1, 2).T
     return Counter(zip(a[apart[a, b]].tolist(), b[apart[a, b]].tolist(), strict=True))
 
@@ -67,7 +70,7 @@ def without_unloaded(scene: Scene) -> Scene:
     No group is left out where a body could move freely (a solve refuses it by name), and nothing
     where there would be nothing to solve.
     """
-    if scene.histories:  # what acts in one step may not in another
+    if scene.loads.histories:  # what acts in one step may not in another
         return scene
     gaps, free = _gaps(scene), scene.free
     acting = (gaps @ free.basis).tocsr()
@@ -104,8 +107,8 @@ def _unloaded(
     group = joined_bodies(acting, bodies, n_bodies)
     offset = scene.free.offset
     awake, imposed = np.zeros((2, n_bodies), dtype=bool)
-    imposed[scene.body[(offset.reshape(scene.force.shape) != 0).any(axis=1)]] = True
-    awake[scene.body[(scene.force != 0).any(axis=1)]] = True
+    imposed[scene.body[(offset.reshape(scene.loads.force.shape) != 0).any(axis=1)]] = True
+    awake[scene.body[(scene.loads.force != 0).any(axis=1)]] = True
     for part in scene.parts:
         imposed[scene.body[part.loaded]] = True
     awake |= imposed

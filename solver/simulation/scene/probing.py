@@ -17,7 +17,11 @@ _NEAR, _ON_SURFACE = 1e-6, 1e-2
 def places_of(scene: Scene, name: str) -> np.ndarray:
     """The local places (k, dim) of a probe: a point, or the nodes of a group."""
     probe = scene.case.probes[name]
-    return scene.points[scene.probed[name]] if probe.group else np.array([probe.at]) - scene.origin
+    return (
+        scene.points[scene.named.probed[name]]
+        if probe.group
+        else np.array([probe.at]) - scene.coordinates.origin
+    )
 
 
 def cell_at(scene: Scene, name: str) -> Located:
@@ -27,7 +31,7 @@ def cell_at(scene: Scene, name: str) -> Located:
         given = scene.given.groups[probe.within]
         blocks = [(kind, cells[scene.mesh.members(kind, given)]) for kind, cells in blocks]
     found = locate(scene.points, blocks, places_of(scene, name)[0])
-    inside = [one for one in found if one.distance <= _NEAR * scene.length]
+    inside = [one for one in found if one.distance <= _NEAR * scene.coordinates.length]
     if not inside:
         allowed = f"no cell is there; the nearest is {found[0].distance:.3g} away"
         raise _refusal(scene, name, allowed)
@@ -39,7 +43,9 @@ def cell_at(scene: Scene, name: str) -> Located:
 def faces_at(scene: Scene, name: str, faces: list[tuple[str, np.ndarray]]) -> list[Located]:
     """The slave faces, of those of its zone, that are nearest to each place of a probe."""
     found = [locate(scene.points, faces, place)[0] for place in places_of(scene, name)]
-    away = next((f.distance for f in found if f.distance > _ON_SURFACE * scene.length), None)
+    away = next(
+        (f.distance for f in found if f.distance > _ON_SURFACE * scene.coordinates.length), None
+    )
     if away is not None:
         zone = scene.case.probes[name].zone
         raise _refusal(scene, name, f"is {away:.3g} from the slave surface of {zone}")

@@ -18,17 +18,17 @@ from ...lac.operator import GapOperator
 from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.faces import volume_cells
-from ...mechanics.fem.supports import Fixed, FreeMotion
+from ...mechanics.fem.supports import FreeMotion
 from ...mechanics.mortar.treatments import TREATMENTS, Treatment, merge_fixed_multipliers
 from ...system.progress import Clock, stage
 from ..options import LEAN, Options
 from .attributes import Attributes
 from .cut_groups import CutZone, Surfaces, refuse_bent, surfaces_of
 from .groups import ON_AXIS, check_groups, named_parts
-from .holdings.rigid import Frame
 from .operators import operator_of, with_contact_frames
 from .parts import parts_of
 from .parts.part import ModelPart
+from .records import Coordinates, GivenMesh, Held, Loads, Named, Unloaded
 from .selections import with_groups
 
 # An average initial gap below this many roundings of the coordinates is zero.
@@ -99,62 +99,27 @@ class ZoneScene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GivenMesh:
-    """The mesh before the cut.
-
-    `cells`: the volume cells by type; `groups`: which of them (n,) each named group holds;
-    `unnamed`: how many groups of the mesh, and of its faces and edges, the case does not name.
-    """
-
-    cells: dict[str, np.ndarray]
-    groups: dict[str, dict[str, np.ndarray]]
-    unnamed: tuple[int, int]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Unloaded:
-    """What nothing moves (see `solver.simulation.scene.bodies`).
-
-    `unloaded_bodies` (b,) and `unloaded_multipliers` (k,) are left out of the solve, and the cells
-    of `fixed_bodies` (b,): `blocks` and `free` of the scene are without them.
-    """
-
-    unloaded_bodies: np.ndarray
-    fixed_bodies: np.ndarray
-    unloaded_multipliers: np.ndarray
-
-
-@dataclass(frozen=True, kw_only=True)
 class Scene:
     """The discrete problem of a case as solved (see `Case.as_solved`).
 
-    `points` (n, dim) are counted from `origin` (dim,), the mean of the mesh's nodes: far from the
-    origin of the coordinates, differences would lose digits. `length` is the largest extent of the
-    mesh, `rounding` how well its coordinates are known (a length). `mesh` is the mesh after the
-    cut, `body` (n,) the body of each node. `blocks` are the elastic cells, `parts` what there is
-    beside them. `fixed`: the displacements that are held, `rigid`: the rigid bodies. `probed`:
-    nodes by probe; `acted`: nodes by the key of the support, or of the load on a surface. `force`
-    (n, dim), all but that of `parts`, and `free.offset` are for load factor 1.
+    `points` (n, dim) are counted as `coordinates` says. `mesh` is the mesh after the cut, `body`
+    (n,) the body of each node. `blocks` are the elastic cells, `parts` what there is beside them;
+    `loads` are all but those of parts, and `free.offset` is for load factor 1.
     """
 
     case: Case
     options: Options
     given: GivenMesh
-    origin: np.ndarray
-    length: float
-    rounding: float
+    coordinates: Coordinates
     points: np.ndarray
     mesh: CutMesh
     body: np.ndarray
     blocks: list[Block]
     parts: tuple[ModelPart, ...]
-    fixed: list[Fixed]
-    rigid: dict[str, Frame]
+    held: Held
     free: FreeMotion
-    force: np.ndarray
-    probed: dict[str, np.ndarray]
-    acted: dict[str, np.ndarray]
-    histories: dict[str, tuple[np.ndarray, np.ndarray]]
+    loads: Loads
+    named: Named
     zones: list[ZoneScene]
     rest: Unloaded
 
@@ -166,8 +131,8 @@ class Scene:
     def given_loads(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
         """The same without the forces of parts."""
         if not isinstance(step, dict):
-            return step * self.force, step * self.free.offset
-        named = [(step.get(name, 1.0), *loads) for name, loads in self.histories.items()]
+            return step * self.loads.force, step * self.free.offset
+        named = [(step.get(name, 1.0), *loads) for name, loads in self.loads.histories.items()]
         force = np.sum([f * force for f, force, _ in named], axis=0)
         return force, np.sum([f * offset for f, _, offset in named], axis=0)
 
@@ -285,21 +250,19 @@ def scene_of(model: CutModel, groups: Attributes, clock: Clock) -> Scene:
         case=case,
         options=options,
         given=model.given,
-        origin=groups.origin,
-        length=model.length,
-        rounding=model.rounding,
+        coordinates=Coordinates(groups.origin, model.length, model.rounding),
         points=groups.points,
         mesh=groups.cut,
         body=groups.body,
         blocks=blocks,
         parts=parts,
-        fixed=list(groups.fixed().values()),
-        rigid=groups.frames(),
+        held=Held(list(groups.fixed().values()), groups.frames()),
         free=free,
-        force=force,
-        probed={n: groups.nodes(p.group, "probes") for n, p in case.probes.items() if p.group},
-        acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
-        histories=groups.histories(),
+        loads=Loads(force, groups.histories()),
+        named=Named(
+            probed={n: groups.nodes(p.group, "probes") for n, p in case.probes.items() if p.group},
+            acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
+        ),
         zones=zones,
         rest=Unloaded(
             unloaded_bodies=np.zeros(n_bodies, dtype=bool),

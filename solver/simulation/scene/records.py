@@ -1,0 +1,71 @@
+"""What a scene holds: how its points are counted, what is held, loaded, named, or left out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...mechanics.fem.supports import Fixed
+from .holdings.rigid import Frame
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenMesh:
+    """The mesh before the cut.
+
+    `cells`: the volume cells by type; `groups`: which of them (n,) each named group holds;
+    `unnamed`: how many groups of the mesh, and of its faces and edges, the case does not name.
+    """
+
+    cells: dict[str, np.ndarray]
+    groups: dict[str, dict[str, np.ndarray]]
+    unnamed: tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unloaded:
+    """What nothing moves (see `solver.simulation.scene.bodies`).
+
+    `unloaded_bodies` (b,) and `unloaded_multipliers` (k,) are left out of the solve, and the cells
+    of `fixed_bodies` (b,): `blocks` and `free` of the scene are without them.
+    """
+
+    unloaded_bodies: np.ndarray
+    fixed_bodies: np.ndarray
+    unloaded_multipliers: np.ndarray
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """How points are counted: from `origin` (dim,), the mean of the mesh's nodes.
+
+    Far from the origin of the case's coordinates, differences would lose digits. `length` is the
+    largest extent of the mesh, `rounding` how well its coordinates are known (a length).
+    """
+
+    origin: np.ndarray
+    length: float
+    rounding: float
+
+
+@dataclass(frozen=True)
+class Held:
+    """The displacements that are `fixed`, and the `rigid` bodies by name."""
+
+    fixed: list[Fixed]
+    rigid: dict[str, Frame]
+
+
+@dataclass(frozen=True)
+class Loads:
+    """`force` (n, dim) for load factor 1; by name in steps of names, forces and offsets."""
+
+    force: np.ndarray
+    histories: dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Named:
+    """Nodes by probe, and those `acted` on by the key of the support, or load on a surface."""
+
+    probed: dict[str, np.ndarray]
+    acted: dict[str, np.ndarray]
