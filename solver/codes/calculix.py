@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import meshio
 import numpy as np
@@ -36,10 +37,17 @@ RINGS = {k.name: f"CAX{k.n_nodes}" for k in _CELLS if k.dim == 2}
 # the unit of length. On curved surfaces the overlap of facets is pressure, and a softer contact is
 # the better one: the manual's advice of 5 to 50 E for millimetres.
 STIFFNESS, ON_CURVES = 2.5e4, 2e2
+# Of bodies that move far. With a stiffer one nodes under the end of the master bear up to five
+# times the pressure, and from 500 on the steps do not converge.
+MOVING = 1.0
 # Faces that end on the axis carry no contact: a bore of this radius, over the model's extent.
 _BORE = 1e-6
 _CORRECTION = 1e-5
 _PLANE = 1e-6
+# By default a correction of 1 % of the largest displacement ends the iterations.
+_CONTROLS = ("*CONTROLS, PARAMETERS=FIELD", f"0.005, {_CORRECTION:g}")
+# Of a step on which bodies move far, the largest part that is solved at once, and the most parts.
+_PART, _MOST = 0.25, 1000
 _NAME = "deck"
 
 
@@ -48,6 +56,7 @@ class CalculiX:
 
     name = "calculix"
     layer = True
+    follows = True
     install = "Debian has it as calculix-ccx"
     gave_up = r"\*ERROR: (?:increment size smaller than minimum|too many \w+)[^\n]*"
 
@@ -60,7 +69,8 @@ class CalculiX:
         return {
             "contact": "SURFACE TO SURFACE",
             "pressure-overclosure": f"LINEAR, {self.stiffness:g} E / face size, "
-            f"{min(self.stiffness, ON_CURVES):g} on curved surfaces",
+            f"{min(self.stiffness, ON_CURVES):g} on curved surfaces, "
+            f"{min(self.stiffness, MOVING):g} of bodies that move far (NLGEOM)",
             "curved faces": "gaps as meshed: the overlap of facets is pressure",
             "elements": f"{', '.join([*ELEMENTS.values(), *RINGS.values()])}; "
             "plane cases as one layer",
@@ -152,11 +162,30 @@ def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:
     yield from _equal(deck, below)
     yield from _oblique(deck)
     yield from _contact(deck, stiffness)
+    if deck.path:
+        yield from _amplitude_lines(deck)
     if deck.start.any():
         yield from _closing(deck)
-    yield from ("*STEP, INC=1000", "*STATIC", "1., 1.")
-    # By default a correction of 1 % of the largest displacement ends the iterations.
-    yield from ("*CONTROLS, PARAMETERS=FIELD", f"0.005, {_CORRECTION:g}", "*BOUNDARY, OP=NEW")
+    yield from _path(deck) if deck.path else _step(deck)
+    rings = ", OUTPUT=2D" if deck.case.axisymmetric else ""
+    at = ", TIME POINTS=POSITIONS" if deck.path else ""
+    yield from (
+        f"*NODE FILE{rings}{at}",
+        "U",
+        f"*EL FILE{at}",
+        "S",
+        f"*CONTACT FILE{at}",
+        "CDIS, CSTR",
+    )
+    # Forces on sections of rings are of a small angle of them.
+    for zone in (pair.zone for pair in deck.pairs if not deck.case.axisymmetric):
+        yield from (f"*CONTACT PRINT, SLAVE={zone.slave}, MASTER={zone.master}", "CF")
+    yield "*END STEP"
+
+
+def _step(deck: Deck) -> Iterator[str]:
+    """The step of a case up to what it prints."""
+    yield from ("*STEP, INC=1000", "*STATIC", "1., 1.", *_CONTROLS, "*BOUNDARY, OP=NEW")
     yield from _boundary(deck, 1.0)
     if deck.pressures:
         yield "*DLOAD"
@@ -166,19 +195,57 @@ def deck_lines(deck: Deck, stiffness: float = STIFFNESS) -> Iterator[str]:
         yield "*CLOAD"
         for node, axis, value in deck.loaded():
             yield f"{node + 1}, {axis + 1}, {value:.13e}"
-    rings = ", OUTPUT=2D" if deck.case.axisymmetric else ""
-    yield from (
-        f"*NODE FILE{rings}",
-        "U",
-        "*EL FILE",
-        "S",
-        "*CONTACT FILE",
-        "CDIS, CSTR",
-    )
-    # Forces on sections of rings are of a small angle of them.
-    for zone in (pair.zone for pair in deck.pairs if not deck.case.axisymmetric):
-        yield from (f"*CONTACT PRINT, SLAVE={zone.slave}, MASTER={zone.master}", "CF")
-    yield "*END STEP"
+
+
+def _path(deck: Deck) -> Iterator[str]:
+    """One step of bodies that move far, a unit of its time for each step of the case.
+
+    Another step would begin without the contact of the one before. See `_amplitudes`.
+    """
+    names, last = _amplitudes(deck), len(deck.path)
+    yield from (f"*STEP, NLGEOM, INC={_MOST * last}", "*STATIC", f"{_PART:g}, {last}., , {_PART:g}")
+    yield from (*_CONTROLS, "*BOUNDARY, OP=NEW")
+    fixed = np.array([step.held for step in deck.path])
+    for node, axis, _ in deck.fixed():
+        if not fixed[:, node, axis].any():
+            yield f"{node + 1}, {axis + 1}, {axis + 1}, 0."
+    for series, name in names.items():
+        where = [f"{node + 1}, {axis + 1}" for node, axis in _like(fixed, series)]
+        if where:
+            yield f"*BOUNDARY, AMPLITUDE={name}"
+            yield from (f"{one}, {one.split()[1]}, 1." for one in where)
+        where = [f"{n + 1}, {a + 1}" for n, a in _like([s.forces for s in deck.path], series)]
+        if where:
+            yield f"*CLOAD, AMPLITUDE={name}"
+            yield from (f"{one}, 1." for one in where)
+    for number, (faces, _) in enumerate(deck.pressures):
+        series = tuple(step.pressures[number] for step in deck.path)
+        if any(series):
+            yield f"*DLOAD, AMPLITUDE={names[series]}"
+            yield from (f"{element}, P{face}, 1." for element, face in _faces(deck, faces))
+
+
+def _like(steps: Sequence[np.ndarray] | np.ndarray, series: tuple[float, ...]) -> Iterator[Any]:
+    """Node and axis where fields (n, dim) of the steps have a series of values."""
+    same = (np.array(steps) == np.array(series)[:, None, None]).all(axis=0)
+    return zip(*map(np.ndarray.tolist, np.nonzero(same)), strict=True)
+
+
+def _amplitudes(deck: Deck) -> dict[tuple[float, ...], str]:
+    """The names of all series of values, one for each step, that displacements and loads have."""
+    fields = [np.array([getattr(s, name) for s in deck.path]) for name in ("held", "forces")]
+    columns = [field.reshape(len(deck.path), -1).T for field in fields]
+    columns.append(np.array([step.pressures for step in deck.path]).T)
+    found = {tuple(row.tolist()): "" for column in columns for row in column if row.any()}
+    kept = [series for series in found if not np.isnan(series).any()]
+    return {series: f"GIVEN{number}" for number, series in enumerate(kept)}
+
+
+def _amplitude_lines(deck: Deck) -> Iterator[str]:
+    yield from ("*TIME POINTS, NAME=POSITIONS", *(f"{n}.," for n in range(1, len(deck.path) + 1)))
+    for series, name in _amplitudes(deck).items():
+        yield f"*AMPLITUDE, NAME={name}"
+        yield from (f"{time}., {value:.13e}" for time, value in enumerate((0.0, *series)))
 
 
 def printed_forces(deck: Deck, text: str) -> dict[str, np.ndarray]:
@@ -288,6 +355,7 @@ def _flat(deck: Deck) -> bool:
 
 def _contact(deck: Deck, stiffness: float) -> Iterator[str]:
     stiffness = stiffness if not deck.pairs or _flat(deck) else min(stiffness, ON_CURVES)
+    stiffness = min(stiffness, MOVING) if deck.path else stiffness
     slope = stiffness * deck.softest / face_size(deck) if deck.pairs else 0.0
     names: dict[float, str] = {}
     for friction in {pair.zone.friction: None for pair in deck.pairs}:

@@ -23,6 +23,7 @@ from ..verification.verdict import CheckResult
 from .contact import SurfaceValues, own_solution, pressure_force, surfaces
 from .faults import fault, summed_up
 from .model import Model
+from .path import at_last_position
 from .placing import Placed, Placer, flattened
 
 if TYPE_CHECKING:
@@ -77,6 +78,8 @@ class Compared:
         if not fields and not foreign.forces:
             raise InputError(where, "fields", None, "the result gives nothing to check")
         placed = {name: placer.place(field, name) for name, field in fields.items()}
+        if case.moving:
+            return cls.of(*at_last_position(placer, placed))
         pressures, gaps = (
             surfaces(model, placed[name], where, name) if name in placed else []
             for name in ("pressure", "gap")

@@ -19,6 +19,7 @@ from ..lac.cells.faces import (
     surface_vectors,
 )
 from ..lac.cells.shape import gauss_rule
+from ..simulation.equilibrium.constraints import MIN_COVERAGE
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 from ..system.errors import InputError
@@ -65,10 +66,33 @@ class SurfaceValues:
             exact = reference.exact
             field = exact.contact_pressure if quantity == "pressure" else exact.gap
             return Sample(self.placed.values, field(self.placed.places), self.place)
-        if self.kind == "face" and quantity == "pressure":
+        if quantity != "pressure":
+            return Sample(self.placed.values, evaluate(reference, self.placed.places), self.place)
+        if self.kind == "face":
             expected = expected_pressure(self.zone, reference)[self.numbers]
-            return Sample(self.placed.values, expected, self.place)
-        return Sample(self.placed.values, evaluate(reference, self.placed.places), self.place)
+        else:
+            expected = np.asarray(evaluate(reference, self.placed.places))
+        # Under the end of the master a value is neither the reference nor zero.
+        share = self._covered()
+        known = np.flatnonzero((share == 0) | (share == 1))
+        expected = np.where(share[known] == 0, 0.0, expected[known])
+        return Sample(self.placed.values[known], expected, lambda i: self.place(int(known[i])))
+
+    def _covered(self) -> np.ndarray:
+        """Whether the faces around each value (k,) are under the master: 1, 0, or some of both."""
+        zone, coverage = self.zone, self.zone.coverage
+        covered = np.where(
+            coverage > 1 - MIN_COVERAGE, 1.0, np.where(coverage > MIN_COVERAGE, 0.5, 0)
+        )
+        if self.kind == "face":
+            return covered[self.numbers]
+        if self.kind == "point":
+            return covered[cKDTree(zone.centre).query(self.placed.places)[1]]
+        total, count = np.zeros((2, int(zone.slave_nodes.max()) + 1))
+        for _, nodes, macro in zone.faces:
+            np.add.at(total, nodes, covered[macro][:, None])
+            np.add.at(count, nodes, 1.0)
+        return (total / np.maximum(count, 1.0))[self.numbers]
 
     def force(self, model: Model) -> np.ndarray | None:
         """The force (dim,) of the pressure on the slave; None where no area is known."""

@@ -21,6 +21,7 @@ from ..simulation.scene.cut_groups import faces_of
 from ..simulation.scene.groups import check_groups, named_parts
 from ..simulation.scene.selections import with_groups
 from .layer import as_layer
+from .path import DeckStep, steps_of
 
 # Supports as codes take them: displacements of nodes along axes, and along other directions.
 
@@ -98,11 +99,12 @@ def closing(
     held: np.ndarray,
     oblique: Sequence[Oblique],
     pairs: Sequence[tuple[Zone, list[FaceBlock], list[FaceBlock]]],
+    touching: bool = False,
 ) -> np.ndarray:
     """Displacement (n, dim), zero except on bodies that contact alone can hold.
 
-    Such a body, of an open zone, is moved to the other side until they overlap a little. Without
-    contact at the start the first matrix of a code is singular.
+    Such a body, of an open zone, or of one that is `touching`, is moved to the other side until
+    they overlap a little. Without contact at the start the first matrix of a code is singular.
     """
     start = np.zeros_like(points)
     body = body_numbers(len(points), cells)
@@ -116,7 +118,7 @@ def closing(
                 continue
             gap = _gaps(points, zone, mine, other)
             extent = float(np.ptp(points, axis=0).max())
-            if np.median(gap) > _CLOSED * extent:
+            if touching or np.median(gap) > _CLOSED * extent:
                 moved = (max(gap.min(), 0.0) + _OVERLAP * extent) * direction
                 start[of] = np.where(np.isnan(held[of]), moved, 0.0)
             break
@@ -177,7 +179,7 @@ class Deck:
     `pressures`: faces, turned outward, and the constant pressure on them. `forces` (n, dim) are the
     consistent nodal forces of all other loads, `all_forces` those of the pressures too. `plane`:
     how many of the nodes are those of the plane mesh under one layer of cells; 0 where the deck is
-    the mesh itself.
+    the mesh itself. `path`: the steps of bodies that move far, of which the values are the last.
     """
 
     case: Case
@@ -193,6 +195,7 @@ class Deck:
     all_forces: np.ndarray
     pairs: list[PairedFaces]
     plane: int = 0
+    path: tuple[DeckStep, ...] = ()
 
     @property
     def starts(self) -> dict[str, int]:
@@ -233,16 +236,17 @@ class Deck:
         yield from zip(nodes.tolist(), axes.tolist(), values.tolist(), strict=True)
 
 
-def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
+def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False, follows: bool = False) -> Deck:
     """The deck of a case on its mesh; `layer`: a plane one as one layer of cells in space.
 
-    Raises InputError where case and mesh do not fit, UnsupportedError for what no code is given:
-    springs, groups that move as one, initial strain, factors of single loads.
+    `follows`: the code follows bodies that move far. Raises InputError where case and mesh do not
+    fit, UnsupportedError for what no code is given: springs, groups that move as one, initial
+    strain, factors of single loads.
     """
     mesh = with_groups(case, mesh)
     check_groups(case, mesh)
     mesh, _ = named_parts(case, mesh)
-    _refuse(case)
+    _refuse(case, follows)
     layer = layer and mesh.points.shape[1] == 2 and not case.axisymmetric
     plane = len(mesh.points) if layer else 0
     if plane:
@@ -256,6 +260,8 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
     numbers = given.by_material(lambda m: float(materials.index(m)), len(materials) - 1.0)
     factor = case.factors[-1]
     held, oblique = split(given.supports(), mesh.points.shape[1])
+    constant = [load for load in case.loads if _is_constant(load)]
+    path = tuple(steps_of(case, given.histories(), np.isnan(held), constant)) if case.moving else ()
     flat = 2 if plane else mesh.points.shape[1]
     pairs = [_paired(case, mesh, i, flat) for i in range(len(case.zones))]
     return Deck(
@@ -264,20 +270,29 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False) -> Deck:
         cells=cells,
         materials=materials,
         material={name: found.astype(int) for name, found in numbers.items()},
-        held=factor * held,
+        held=path[-1].held if path else factor * held,
         oblique=[replace(each, value=factor * each.value) for each in oblique],
         start=closing(
-            mesh.points, cells, held, oblique, [(p.zone, p.slave, p.master) for p in pairs]
+            mesh.points,
+            cells,
+            held,
+            oblique,
+            [(p.zone, p.slave, p.master) for p in pairs],
+            touching=bool(path),
         ),
         pressures=[
-            (faces_of(mesh, load.group, case, f"loads[{i}].group"), factor * load.value)
+            (
+                faces_of(mesh, load.group, case, f"loads[{i}].group"),
+                load.factor(case.steps[-1]) * load.value,
+            )
             for i, load in enumerate(case.loads)
             if isinstance(load.value, float) and _is_constant(load)
         ],
-        forces=factor * given.forces(),
+        forces=path[-1].forces if path else factor * given.forces(),
         all_forces=factor * Attributes(case, mesh, whole, [], origin).forces(),
         pairs=pairs,
         plane=plane,
+        path=path,
     )
 
 
@@ -292,13 +307,22 @@ def _is_constant(load: Load) -> bool:
     return load.kind == "pressure" and isinstance(load.value, float)
 
 
-def _refuse(case: Case) -> None:
+def _refuse(case: Case, follows: bool) -> None:
+    if case.moving and not follows:
+        raise UnsupportedError("bodies that move far (motion: large): not written for this code")
+    if case.moving and any("normal" in support.fix for support in case.supports):
+        raise UnsupportedError("a support along normals of bodies that move far: not written")
     if case.moving:
-        raise UnsupportedError("bodies that move far (motion: large): not written for codes")
+        _refuse_parts(case)
+        return
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
     if len(case.steps) > 1 and case.frictional:
         raise UnsupportedError("a path of steps with friction: not written for codes")
+    _refuse_parts(case)
+
+
+def _refuse_parts(case: Case) -> None:
     if any(load.strains for load in case.loads):
         raise UnsupportedError("initial strain and change of temperature: not written for codes")
     if any(support.together or support.cyclic for support in case.supports):

@@ -16,7 +16,6 @@ from ..simulation.results.records import Cost, Fields, Scalars
 from ..simulation.results.results import body_infos
 from ..simulation.results.solution import Solution, ZoneResult
 from ..simulation.scene.scene import Scene, ZoneScene, build_scene
-from ..system.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -33,9 +32,6 @@ class Model:
     @classmethod
     def of(cls, case: Case, mesh: meshio.Mesh) -> Model:
         """The model of a case; raises InputError where case and mesh do not fit."""
-        if case.moving:
-            allowed = "results of other codes are compared where bodies move little; allowed: small"
-            raise InputError(case.path, "motion", case.motion, allowed)
         return cls(case, mesh, build_scene(case, mesh))
 
     @property

@@ -31,6 +31,7 @@ class Plain:
 
     name = "plain"
     layer = False
+    follows = False
     install = "only written, by export"
     gave_up = ""
     settings: Mapping[str, str] = {}

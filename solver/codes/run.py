@@ -106,6 +106,7 @@ class PluginCode:
     def __init__(self, folder: Path, file: PluginFile, base: "Code"):
         self.name, self.folder, self.file, self.base = folder.resolve().name, folder, file, base
         self.layer, self.install = file.layer or base.layer, file.install
+        self.follows = base.follows
         self.gave_up = file.gave_up or base.gave_up
         self.settings: Mapping[str, str] = {**base.settings, **file.settings}
 
@@ -183,12 +184,14 @@ class Code(Protocol):
     """One code: writes its input, gives the command to run, reads its results.
 
     `name` is its name in `<case>@<name>`. `layer`: a plane case is given to it as one layer of
-    cells in space. `settings` are shown beside its results. `install`: how it is installed.
+    cells in space. `follows`: it follows bodies that move far. `settings` are shown beside its
+    results. `install`: how it is installed.
     `gave_up`: a regular expression that its output matches if the solve does not converge.
     """
 
     name: str
     layer: bool
+    follows: bool
     install: str
     gave_up: str
 
@@ -279,7 +282,7 @@ def run_case(
         try:
             if not version:
                 raise UnsupportedError(f"not installed: {code.install}")
-            deck = deck_of(case, mesh, code.layer)
+            deck = deck_of(case, mesh, code.layer, code.follows)
             found = run_code(code, deck, Path(scratch), limits or Limits())
             found = replace(_thin(found) if case.thin else found, version=version)
             # What a code does not write is no fault of the result.

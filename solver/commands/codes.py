@@ -46,7 +46,7 @@ def run_export(options: argparse.Namespace) -> int:
     code, case, mesh = _chosen(options)
     options.output.mkdir(parents=True, exist_ok=True)
     try:
-        code.write(deck_of(case, mesh, code.layer), options.output)
+        code.write(deck_of(case, mesh, code.layer, code.follows), options.output)
     except UnsupportedError as error:
         raise InputError(options.case, "--code", code.name, str(error)) from None
     command = " ".join(code.command(options.output))

@@ -202,7 +202,7 @@ def _by_calculix(
     if not code.version():
         return ended("missing", f"{code.name} is not installed")
     [pressure] = [load.value for load in case.loads if isinstance(load.value, float)]
-    deck = deck_of(case, read_mesh(mesh), code.layer)
+    deck = deck_of(case, read_mesh(mesh), code.layer, code.follows)
     try:
         found = run_code(code, deck, folder, Limits(limit, float("inf"), list(cores)))
     except (SolveError, CrashError) as error:

@@ -100,7 +100,7 @@ def test_another_program_with_the_input_of_calculix(tmp_path):
     assert (code.layer, code.settings["build"]) == (True, "mine")
     assert (
         code.settings["pressure-overclosure"]
-        == "LINEAR, 25000 E / face size, 200 on curved surfaces"
+        == "LINEAR, 25000 E / face size, 200 on curved surfaces, 1 of bodies that move far (NLGEOM)"
     )
 
 

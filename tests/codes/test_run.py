@@ -18,6 +18,7 @@ class Fake:
 
     name = "fake"
     layer = False
+    follows = False
     install = "make fake"
     gave_up = "no luck at .*"
     settings = {"penalty": "50 E"}  # noqa: RUF012

@@ -318,13 +318,13 @@ def settled(groups: Moved, displacement: np.ndarray, held: np.ndarray) -> Frames
         if groups.axisymmetric:
             goal[0] = middle[0]
         else:
-            turn = _best_turn((now - middle) * share[:, None], then - goal)
+            turn = best_turn((now - middle) * share[:, None], then - goal)
         shift = turn @ (frames.shift[number] - middle) + goal
         frames = frames.with_body(number, turn @ frames.turn[number], shift)
     return frames
 
 
-def _best_turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def best_turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The rotation (dim, dim) of vectors (n, dim) that fits others best (Kabsch, 1976)."""
     left, _, right = np.linalg.svd(before.T @ after)
     sign = np.eye(len(left))

@@ -1,0 +1,98 @@
+"""Bodies that move far: what acts on a deck in each step, and a result at the last position.
+
+Codes follow bodies by the geometry of their own displacements. A result is compared where these
+bring the bodies: the rigid motion of each body is taken off its displacements and moves its mesh.
+The rest is a solve of linear theory there, of the last step alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import meshio
+import numpy as np
+
+from ..case.acting import Load, Step
+from ..case.model import Case
+from ..simulation.scene.moved import Frames, best_turn
+from ..simulation.scene.scene import replace_points
+from ..simulation.scene.selections import with_groups
+from ..system.errors import InputError
+
+if TYPE_CHECKING:
+    from .foreign import Field, ForeignResult
+    from .placing import Placed, Placer
+
+
+@dataclass(frozen=True)
+class DeckStep:
+    """A step: `held` (n, dim), NaN where free, `forces` (n, dim), values of `pressures`."""
+
+    held: np.ndarray
+    forces: np.ndarray
+    pressures: list[float]
+
+
+def steps_of(
+    case: Case,
+    histories: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    free: np.ndarray,
+    pressures: list[Load],
+) -> Iterator[DeckStep]:
+    """What acts in each step of named factors; `free` (n, dim): not held, `histories`: by name."""
+    for step in case.steps:
+        factors = {name: _factor(step, name) for name in histories}
+        forces = sum(factors[name] * force for name, (force, _) in histories.items())
+        offset = sum(factors[name] * offset for name, (_, offset) in histories.items())
+        held = np.where(free, np.nan, np.asarray(offset).reshape(free.shape))
+        values = [load.factor(step) * float(load.value) for load in pressures]
+        yield DeckStep(held, np.asarray(forces), values)
+
+
+def _factor(step: Step, name: str) -> float:
+    return step.get(name, 1.0) if isinstance(step, dict) else step
+
+
+def at_last_position(
+    placer: Placer, placed: Mapping[str, Placed]
+) -> tuple[Case, ForeignResult, meshio.Mesh]:
+    """The case, a result and the mesh where the last step brought the bodies.
+
+    `placed` are the fields of the result that `placer` has, by name on the mesh as given.
+    Raises InputError for a result without displacements, or with a place between bodies.
+    """
+    model, foreign, where = placer.model, placer.foreign, placer.where
+    moved = placed.get("displacement")
+    if moved is None:
+        raise InputError(where, "displacement", None, "is needed where bodies move far")
+    for name, values in placed.items():
+        if (values.body < 0).any():
+            raise InputError(where, name, None, "each value needs its body where bodies move far")
+    frames = Frames.still(int(model.body.max()) + 1, model.dim)
+    for number in np.unique(moved.body).tolist():
+        mine = moved.body == number
+        places = moved.places[mine]
+        now = places + moved.values[mine, : model.dim]
+        middle, goal = places.mean(axis=0), now.mean(axis=0)
+        turn = best_turn(places - middle, now - goal)
+        frames = frames.with_body(number, turn, goal - turn @ middle)
+    fields: dict[str, Any] = {
+        name: _moved(getattr(foreign, name), of, frames) for name, of in placed.items()
+    }
+    motion = fields["displacement"].places - moved.places
+    left = moved.values[:, : model.dim] - motion
+    fields["displacement"] = replace(fields["displacement"], values=left)
+    given, own = with_groups(model.case, model.mesh), None
+    there = replace_points(given, frames.placed(given.points, model.body))
+    if foreign.mesh is not None and placer.points is not None:
+        own = meshio.Mesh(frames.placed(placer.points, placer.body), foreign.mesh.cells)
+    then = replace(model.case, motion="small", steps=model.case.steps[-1:], selections=())
+    return then, replace(foreign, mesh=own, step=None, **fields), there
+
+
+def _moved(field: Field, placed: Placed, frames: Frames) -> Field:
+    """The values of a field at their places in the bodies that moved."""
+    places = frames.placed(placed.places, placed.body)
+    return replace(field, places=places, values=placed.values, nodes=placed.own, area=placed.area)
