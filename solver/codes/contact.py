@@ -57,8 +57,11 @@ class SurfaceValues:
             return f"({', '.join(f'{x:.6g}' for x in self.placed.places[i])})"
         return f"{self.kind} {self.numbers[i]}"
 
-    def sample(self, reference: Reference, quantity: str) -> Sample:
-        """The values beside the reference: its means over faces, else what it is at the places."""
+    def sample(self, reference: Reference, quantity: str) -> Sample | None:
+        """The values beside the reference: its means over faces, else what it is at the places.
+
+        None where no pressure is known to be one under the master alone.
+        """
         if isinstance(reference, ExactValues):
             if self.kind == "face":
                 means = getattr(reference, quantity)(self.zone)
@@ -74,6 +77,8 @@ class SurfaceValues:
             expected = np.asarray(evaluate(reference, self.placed.places))
         # Under the end of the master a value is neither the reference nor zero.
         share = self._covered()
+        if not (share == 1).any():
+            return None
         known = np.flatnonzero((share == 0) | (share == 1))
         expected = np.where(share[known] == 0, 0.0, expected[known])
         return Sample(self.placed.values[known], expected, lambda i: self.place(int(known[i])))

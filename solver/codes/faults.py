@@ -68,10 +68,11 @@ def _turned(value: np.ndarray, wanted: np.ndarray, names: Sequence[str]) -> str:
 
 def _exchanged(value: np.ndarray, wanted: np.ndarray, names: Sequence[str]) -> str:
     """Components in another order."""
-    size = np.linalg.norm(wanted)
+    # Components that are all but zero may be in any order.
+    most = min(_ALIKE * np.linalg.norm(wanted), np.linalg.norm(value - wanted) / 2)
     for order in permutations(range(len(names))):
         odd = [(names[i], n) for n, i in zip(names, order, strict=True) if names[i] != n]
-        if odd and np.linalg.norm(value[list(order)] - wanted) < _ALIKE * size:
+        if odd and np.linalg.norm(value[list(order)] - wanted) < most:
             listed = ", ".join(f"{found} in place of {name}" for found, name in odd)
             return f"components are in another order: {listed}"
     return ""

@@ -330,6 +330,15 @@ def test_small_motion_is_that_of_linear_theory():
     assert not any("followed" in line.what for line in one.plan)
 
 
+def test_the_work_of_loads_is_energy_and_friction():
+    """Of blocks that slide flat: all of it energy, or lost to friction from the second step on."""
+    free, rough = (run(load_case(CASES / f"motion/slide-c{n}.yaml")) for n in ("", "-friction"))
+    work = sum(step.work for step in free.steps)
+    assert work == pytest.approx(free.scalars.strain_energy, rel=1e-12)
+    for step in rough.steps[1:]:
+        assert step.work == pytest.approx(step.dissipation, rel=1e-12)
+
+
 def test_a_wrong_pressure_at_an_earlier_position_is_noticed():
     solution = run(load_case(CASES / "motion/slide-c-friction.yaml"))
     checks = {check.name: check for check in run_checks(solution)}
