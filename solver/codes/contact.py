@@ -19,7 +19,6 @@ from ..lac.cells.faces import (
     surface_vectors,
 )
 from ..lac.cells.shape import gauss_rule
-from ..simulation.equilibrium.constraints import MIN_COVERAGE
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 from ..system.errors import InputError
@@ -31,6 +30,10 @@ from .placing import NEAR, Placed
 _NOTHING = 1e-9
 # How far from the faces of the case, over their size, a curved surface of another mesh may be.
 _SAGITTA = 0.02
+
+# A face whose share under the master is nearer to one or zero counts as whole, or as bare: strains
+# of bodies that slide move its end.
+_NEARLY = 0.1
 
 
 @dataclass(frozen=True)
@@ -85,10 +88,8 @@ class SurfaceValues:
 
     def _covered(self) -> np.ndarray:
         """Whether the faces around each value (k,) are under the master: 1, 0, or some of both."""
-        zone, coverage = self.zone, self.zone.coverage
-        covered = np.where(
-            coverage > 1 - MIN_COVERAGE, 1.0, np.where(coverage > MIN_COVERAGE, 0.5, 0)
-        )
+        zone, share = self.zone, self.zone.coverage
+        covered = np.where(share > 1 - _NEARLY, 1.0, 0.5 * (share > _NEARLY))
         if self.kind == "face":
             return covered[self.numbers]
         if self.kind == "point":

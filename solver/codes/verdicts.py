@@ -214,7 +214,11 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
     wanted = [name for name in NEEDED if {*CHECKED_BY[name]} & {*missing, *ran}]
     if verdict.verdict == PASSED or (verdict.verdict == SOLVED and wanted):
         asked_for = wanted if only is None else [name for name in wanted if name in only]
-        less = [name for name in asked_for if name not in where or not where[name].whole]
+        less = [
+            name
+            for name in asked_for
+            if name not in where or not where[name].whole or not {*CHECKED_BY[name]} & {*ran}
+        ]
         if less or not asked_for:
             why = _incomplete(where, less)
             verdict = replace(verdict, verdict=PARTIAL, judged="", reason=why)
