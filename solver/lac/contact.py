@@ -29,7 +29,7 @@ from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import gap_operator
 from .reconstruction import form_of, vertex_neighbours
-from .recovery import Recovery, RecoveryRequest
+from .recovery import Recovery, RecoveryRequest, with_status
 from .roughness import Smooth, smoothed
 from .saddle_point import SaddlePoint, numbered
 from .status import find_status
@@ -39,8 +39,6 @@ Recovered = Literal["automatic", "linear", "quadratic", "smooth"]
 Gap = float | Callable[[np.ndarray], np.ndarray]
 # Facets that cover less of their area have no partner, and carry no pressure.
 _COVERED = 1e-9
-# How often a status that the recovered pressure changes is found anew.
-_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -294,19 +292,30 @@ class LocalAverageContact:
         assert recovery is not None
         system, closed, size = state._system, state.closed, len(state._system.force)
         added = numbered(recovery.loads, self._unknown, size).T
-        for _ in range(_ROUNDS):
+
+        def correct(closed: np.ndarray) -> tuple[SaddlePoint, np.ndarray, csr_matrix, np.ndarray]:
             fit = recovery.reconstruction(closed).matrix
             means = system.settled(closed, added @ fit, shape.sweeps)
-            corrected = system.under(added @ (fit @ means))
-            found = corrected.trial(closed)
-            if not (self._opposed & (found.violation(closed) > 1)).any():
-                applied = shape.degree == 2 and shape.keeps_means
-                coefficients = fit @ (means if applied else found.pressure)
-                settled = _state(corrected, closed, state.iterations)
-                return RecoveredState(settled, recovery.error(coefficients), recovery, coefficients)
+            return system.under(added @ (fit @ means)), closed, fit, means
+
+        def wrong(found: tuple[Any, ...]) -> bool:
+            corrected, closed, *_ = found
+            violation = corrected.trial(closed).violation(closed)
+            return bool((self._opposed & (violation > 1)).any())
+
+        def again(found: tuple[Any, ...]) -> np.ndarray:
+            corrected, closed, *_ = found
             settling = corrected.trial, closed, self._opposed, self.area, corrected.stiffness
-            closed = find_status(*settling).closed
-        raise SolveError("the contact status does not settle under the recovered pressure")
+            return find_status(*settling).closed
+
+        settled = with_status(closed, correct, wrong, again)
+        if settled is None:
+            raise SolveError("the contact status does not settle under the recovered pressure")
+        corrected, closed, fit, means = settled
+        found = _state(corrected, closed, state.iterations)
+        applied = shape.degree == 2 and shape.keeps_means
+        coefficients = fit @ (means if applied else found.pressure)
+        return RecoveredState(found, recovery.error(coefficients), recovery, coefficients)
 
 
 def _state(system: SaddlePoint, closed: np.ndarray, iterations: int) -> ContactState:

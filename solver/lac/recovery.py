@@ -15,7 +15,7 @@ D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -29,6 +29,10 @@ from .segments import Segments
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
 _RELAXATION = 0.87
+# How often a status that the recovered pressure changes is found anew.
+_ROUNDS = 3
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -197,6 +201,27 @@ def _same_materials(asked: RecoveryRequest, found: Sequence[Segments]) -> sparse
     i, j = pairs.row, pairs.col
     kept = (asked.material[i] == asked.material[j]) & (least[i] <= least[j]) & (most[j] <= most[i])
     return sparse.csr_matrix((pairs.data[kept], (i[kept], j[kept])), shape=(m, m))
+
+
+def with_status(
+    start: S,
+    correct: Callable[[S], T | None],
+    wrong: Callable[[T], bool],
+    again: Callable[[T], S],
+) -> T | None:
+    """What `correct` finds, from a start whose status is not `wrong` under it.
+
+    Where it is, `again` finds another start. None where there is none, or after three of them.
+
+    >>> with_status(1, lambda n: 10 * n, lambda found: found < 20, lambda found: found // 10 + 1)
+    20
+    """
+    for _ in range(_ROUNDS):
+        found = correct(start)
+        if found is None or not wrong(found):
+            return found
+        start = again(found)
+    return None
 
 
 def settled_means(

@@ -7,19 +7,18 @@ in full, so that means and loads are in equilibrium with the displacement.
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...case.acting import Step
 from ...lac.reconstruction import Reconstruction
-from ...lac.recovery import Recovery, settled_means
+from ...lac.recovery import Recovery, settled_means, with_status
 from ..scene.scene import ZoneScene
 from .problem import ContactProblem
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
-# How often a status that the correction changes is found anew.
-_ROUNDS = 3
 # Sweeps diverge where the last one changes so many times what the first did, and more than this
 # share of the pressure, which is rounding.
 _GROWTH, _ROUNDING = 10, 1e-9
@@ -71,6 +70,15 @@ class RecoveredZone:
 Recovered = dict[str, RecoveredZone]
 
 
+class _Corrected(NamedTuple):
+    """A state under its reconstruction; by zone its fit, coefficients, and loads (n_dofs,)."""
+
+    state: Equilibrium
+    zones: list[ZoneFit]
+    read: list[np.ndarray]
+    forces: list[np.ndarray]
+
+
 def recovered(
     problem: ContactProblem, state: Equilibrium, step: Step
 ) -> tuple[Equilibrium, Recovered]:
@@ -82,28 +90,32 @@ def recovered(
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
     if not given or not state.status.closed.any():
         return state, {}
-    found = state
-    for _ in range(_ROUNDS):
-        zones = [fit_of(zone, found.status.closed) for zone in given]
-        corrected = _corrected(problem, found, zones)
-        if corrected is None:
-            break
-        found, read, forces = corrected
-        wrong = found.trial.violation(found.status.closed) > 1
-        if not (wrong & problem.constraints.eligible).any():
-            return found, {
-                zone.zone.name: RecoveredZone(
-                    name=fit.recovery.form.name,
-                    recovery=fit.recovery,
-                    coefficients=c,
-                    degree=fit.reconstruction.degree,
-                    force=force,
-                )
-                for zone, fit, c, force in zip(given, zones, read, forces, strict=True)
-            }
-        found = problem.solve(step, found.status.closed, correction=found.correction)
-    _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
-    return state, {}
+
+    def correct(state: Equilibrium) -> _Corrected | None:
+        return _corrected(problem, state, [fit_of(zone, state.status.closed) for zone in given])
+
+    def wrong(found: _Corrected) -> bool:
+        violation = found.state.trial.violation(found.state.status.closed)
+        return bool(((violation > 1) & problem.constraints.eligible).any())
+
+    def again(found: _Corrected) -> Equilibrium:
+        closed = found.state.status.closed
+        return problem.solve(step, closed, correction=found.state.correction)
+
+    found = with_status(state, correct, wrong, again)
+    if found is None:
+        _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
+        return state, {}
+    return found.state, {
+        zone.zone.name: RecoveredZone(
+            name=fit.recovery.form.name,
+            recovery=fit.recovery,
+            coefficients=c,
+            degree=fit.reconstruction.degree,
+            force=force,
+        )
+        for zone, fit, c, force in zip(given, found.zones, found.read, found.forces, strict=True)
+    }
 
 
 def settles(first: float, applied: np.ndarray, state: Equilibrium) -> bool:
@@ -130,15 +142,13 @@ def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
 
 def _corrected(
     problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit]
-) -> tuple[Equilibrium, list[np.ndarray], list[np.ndarray]] | None:
-    """The state with the loads of its reconstruction; coefficients and loads (n_dofs,) by zone.
-
-    None where the sweeps diverge.
-    """
+) -> _Corrected | None:
+    """The state with the loads of its reconstruction; None where the sweeps diverge."""
     size = state.correction.size
     sweeps = max(zone.recovery.form.sweeps for zone in zones)
     if not sweeps:
-        return state, [z.coefficients(state.pressure) for z in zones], [np.zeros(size)] * len(zones)
+        read = [z.coefficients(state.pressure) for z in zones]
+        return _Corrected(state, zones, read, [np.zeros(size)] * len(zones))
 
     def loads(pressure: np.ndarray) -> list[np.ndarray]:
         return [z.recovery.loads.T @ z.coefficients(pressure) for z in zones]
@@ -157,4 +167,4 @@ def _corrected(
     if not settles(first, pressure, state):
         return None
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
-    return state, read, added
+    return _Corrected(state, zones, read, added)
