@@ -214,6 +214,11 @@ class Zone(Section, frozen=True):
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
     clearance: Scalar | None = None
 
+    @property
+    def gives_way(self) -> bool:
+        """Whether a closed gap depends on the pressures: they have a compliance."""
+        return self.stabilised
+
     def __post_init__(self) -> None:
         if 0 < self.friction < _LEAST_FRICTION:
             raise FieldError(("friction",), f"must be 0, or at least {_LEAST_FRICTION:g}")

@@ -95,8 +95,8 @@ class ContactProblem:
             release()
         self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
-        stabilised = any(zone.zone.stabilised for zone in scene.zones)
-        soft = partial(compliance_of, scene, self.constraints.normal) if stabilised else None
+        gives_way = any(zone.zone.gives_way for zone in scene.zones)
+        soft = partial(compliance_of, scene, self.constraints.normal) if gives_way else None
         self._systems_of = partial(
             Systems,
             constraints=on_free,

@@ -80,8 +80,8 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"
     size = float(np.ptp(moved, axis=0).max(initial=0.0))
     place = float(np.abs(solution.mesh.points[nodes]).max() + np.abs(moved).max())
-    stabilised = solution.case.zone_named(zone.name).stabilised
-    gap = contact.gap[~contact.closed] if stabilised else contact.gap
+    gives_way = solution.case.zone_named(zone.name).gives_way
+    gap = contact.gap[~contact.closed] if gives_way else contact.gap
     worst = float(gap.min(initial=0.0))
     if worst < -_TOLERANCE * size - round_off * place:
         yield f"zone {zone.name}: the surfaces overlap, a gap of {worst:.3g}"
