@@ -193,7 +193,6 @@ class Zone(Section, frozen=True):
     recovery: how a pressure of higher order is recovered from the constants
     sweeps: solves with the loads of the recovered pressure; each brings it nearer to their limit
     stabilised: contact gives way to pressures that scatter from face to face
-    compliance: of springs in the interface, which a pressure closes by so much
     friction: Coulomb's coefficient of friction; the steps are then a path
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
     clearance: the initial gap, which replaces the gap between the meshed faces
@@ -210,7 +209,6 @@ class Zone(Section, frozen=True):
     recovery: Literal["none", "linear", "quadratic", "smooth", "automatic"] = "none"
     sweeps: Annotated[int, Meta(ge=2, le=100, description="a number from 2 to 100")] | None = None
     stabilised: bool = False
-    compliance: Annotated[float, Meta(ge=0, description="a length per stress")] = 0.0
     friction: Coefficient = 0.0
     interference: Number = 0.0
     points: Annotated[int, Meta(ge=1, le=16, description="a number from 1 to 16")] | None = None
@@ -219,7 +217,7 @@ class Zone(Section, frozen=True):
     @property
     def gives_way(self) -> bool:
         """Whether a closed gap depends on the pressures: they have a compliance."""
-        return self.stabilised or self.compliance > 0
+        return self.stabilised
 
     def __post_init__(self) -> None:
         if 0 < self.friction < _LEAST_FRICTION:

@@ -18,9 +18,6 @@ def compliance_of(scene: Scene, normal: np.ndarray, closed: np.ndarray) -> Compl
         if zone.zone.stabilised and recovery and recovery.stabilisation:
             parts.append(recovery.stabilisation.scatter(mine))
             weight.append(recovery.stabilisation.weight[mine])
-        elif zone.zone.compliance:
-            parts.append(sparse.identity(int(mine.sum()), format="csr"))
-            weight.append(zone.zone.compliance * zone.operator.covered[mine])
         else:
             parts.append(sparse.csr_matrix((0, int(mine.sum()))))
     parts.append(sparse.csr_matrix((0, int(closed[~normal].sum()))))
