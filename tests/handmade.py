@@ -88,13 +88,12 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
         ),
         displacement=np.c_[0.004875 * x[:, 0], -0.011375 * (x[:, 1] + 50)],
         stress=stress,
-        body=np.repeat([0, 1], [14, 8]),
         bodies=[
             BodyInfo("bottom", {"QUAD4": 2}, 2, "slave"),
             BodyInfo("top", {"QUAD4": 3}, 3, "master"),
         ],
         zones=[zone],
-        fields=Fields(stress[:, 1].copy()),
+        fields=Fields(np.repeat([0, 1], [14, 8]), stress[:, 1].copy()),
         quality=Quality(
             balance={
                 "zone interface: force": 1e-15,
@@ -170,13 +169,12 @@ def solid(folder: Path) -> Solution:
         ),
         displacement=np.c_[0.00375 * x[:, :2], -0.0125 * (x[:, 2] + 10)],
         stress=stress,
-        body=np.array([0] * 8 + [1] * 8 + [0]),
         bodies=[
             BodyInfo("bottom", {"HEXA8": 1}, 1, "slave"),
             BodyInfo("top", {"PENTA6": 2}, 2, "master"),
         ],
         zones=[zone],
-        fields=Fields(stress[:, 2].copy()),
+        fields=Fields(np.array([0] * 8 + [1] * 8 + [0]), stress[:, 2].copy()),
         quality=Quality(
             balance={
                 "zone interface: force": 0.0,

@@ -254,7 +254,8 @@ def own_solution(
     for name, values in fields.items():
         if name in placed and placed[name].own is not None:
             values[placed[name].own] = placed[name].values
-    return replace(frame, mesh=cells, body=body, zones=zones, **fields)  # type: ignore[arg-type]
+    named = replace(frame.fields, body=body)
+    return replace(frame, mesh=cells, fields=named, zones=zones, **fields)  # type: ignore[arg-type]
 
 
 def _zone(

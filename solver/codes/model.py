@@ -76,13 +76,12 @@ class Model:
             mesh=meshio.Mesh(self.points, cells, cell_sets=sets),
             displacement=np.full((n, self.dim), np.nan),
             stress=np.full((n, 6), np.nan),
-            body=self.body,
             bodies=body_infos(self.scene),
             zones=[self._zone(zone) for zone in self.scene.zones],
             steps=[],
             plan=[],
             scalars=Scalars(self.length, max(loads, default=0.0) or self._largest_reference),
-            fields=Fields(normal_stress=np.full(n, np.nan)),
+            fields=Fields(body=self.body, normal_stress=np.full(n, np.nan)),
             cost=Cost(macro_elements=sum(zone.count for zone in self.scene.zones)),
         )
 

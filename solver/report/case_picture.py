@@ -96,7 +96,7 @@ def _whole(
         view.lines(axis[None], MUTED, 0.8, stroke_dasharray=(9.0, 3.0, 2.0, 3.0))
     ways = {part.body: part.way for part in drawn}
     points = three(solution.mesh.points)
-    points += share * np.stack([ways[number] for number in range(len(ways))])[solution.body]
+    points += share * np.stack([ways[number] for number in range(len(ways))])[solution.fields.body]
     faces = [face[:2] for part in drawn if part.meshed for face in part.faces]
     seen = _seen(faces, points, view) if dim == 3 else np.ones(len(points), dtype=bool)
     faces = faces if dim == 3 else list(outer_faces(volume_cells(solution.mesh).items()))

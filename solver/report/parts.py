@@ -68,11 +68,11 @@ def parts(solution: Solution) -> Iterator[DrawnPart]:
         if rigid := rigid_surface(solution, number):
             yield DrawnPart(*look, *rigid[:3], ways[number], out=rigid[3])
             continue
-        owners = [(kind, nodes, solution.body[nodes[:, 0]]) for kind, nodes in outer]
+        owners = [(kind, nodes, solution.fields.body[nodes[:, 0]]) for kind, nodes in outer]
         own = [(k, nodes[b == number], b[b == number]) for k, nodes, b in owners]
         yield DrawnPart(*look, points, moved, own, ways[number])
     for zone in solution.zones:
-        number = int(solution.body[zone.slave_nodes[0]])
+        number = int(solution.fields.body[zone.slave_nodes[0]])
         look = (f"{zone.name}: slave faces", "slave", BLUE, mixed(BLUE, PAPER, 0.8), number)
         yield DrawnPart(*look, points, moved, zone.faces, ways[number], zone)
 
@@ -97,7 +97,7 @@ def rigid_surface(
     faces = [face for zone, given in zones if given.master == name for face in zone.faces]
     if surface is None or not faces:
         return None
-    points, own = solution.mesh.points, solution.body == number
+    points, own = solution.mesh.points, solution.fields.body == number
     if solution.fields.motion is not None:
         given = np.c_[points[own] - solution.fields.motion[own], np.ones(own.sum())]
         *turn, shift = np.linalg.lstsq(given, points[own], rcond=None)[0]

@@ -43,7 +43,7 @@ def unit(_: Solution) -> float:
 
 def block_size(solution: Solution) -> float:
     """The extent of the smallest body."""
-    bodies = [solution.mesh.points[solution.body == b] for b in range(len(solution.bodies))]
+    bodies = [solution.mesh.points[solution.fields.body == b] for b in range(len(solution.bodies))]
     return min(float(np.ptp(points, axis=0).max()) for points in bodies if len(points))
 
 

@@ -135,7 +135,7 @@ def _values(solution: Solution) -> Values:
         **vars(solution.scalars),
         largest_displacement=solution.largest_displacement[0],
         pressure=_extremes(_where_covered(zone) for zone in zones),
-        stress=_extremes([solution.fields.normal_stress[solution.body >= 0]]),
+        stress=_extremes([solution.fields.normal_stress[solution.fields.body >= 0]]),
         gap=_extremes(zone.gap for zone in zones),
         status=_extremes(zone.closed.astype(int) for zone in zones),
         coverage=_extremes(zone.coverage for zone in zones),

@@ -186,7 +186,6 @@ def _read_solution(file: h5py.File) -> Solution:
         ),
         displacement=point_data["displacement"][:, :dim],
         stress=point_data["stress"],
-        body=point_data["body"],
         bodies=_read_bodies(file["bodies"]),
         zones=[
             read_zone(file["contact"][name], name, _sub_faces(grid, cell_data, number))
@@ -196,6 +195,7 @@ def _read_solution(file: h5py.File) -> Solution:
         plan=[Line(**row) for row in read_table(file["plan"])],
         scalars=Scalars(**_known(Scalars, scalars)),
         fields=Fields(
+            body=point_data["body"],
             normal_stress=point_data["normal_stress"],
             mean_stress={kind: data[()] for kind, data in file["mean_stress"].items()},
             **vectors,

@@ -97,7 +97,7 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
     for number, info in enumerate(solution.bodies):
         if (body := exact_of.get(info.name)) is None:
             continue
-        mine = solution.body == number
+        mine = solution.fields.body == number
         places = (given[mine, :dim] - placed.origin) @ placed.turn / placed.scale
         local = places @ body.gradient.T + body.shift
         wanted[mine] = placed.scale * local @ placed.turn.T

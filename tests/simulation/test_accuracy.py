@@ -58,7 +58,7 @@ def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compr
     raw = generate(case.mesh, "test")
     exact = exact_state(case, state, raw)
     found = simulate(case, transform(raw, case.transform, "test") if case.transform else raw)
-    stress = exact.stress_at(found.body == found.body[found.zones[0].master_nodes[0]])
+    stress = exact.stress_at(found.fields.body == found.fields.body[found.zones[0].master_nodes[0]])
     errors = [np.abs(zone.multiplier / exact.pressure - 1).max() for zone in found.zones]
     errors.append(np.abs(found.stress - stress).max() / exact.pressure)
     return max(errors) / Accuracy(found.quality.accuracy).estimate

@@ -139,7 +139,7 @@ def test_springs_pull_back_from_where_they_were_made():
     held = {r.group: r.force for r in solution.reactions}
     assert held["springs"][0] == pytest.approx(-0.05 * 10 * 21, rel=1e-3)
     top = np.isclose(solution.mesh.points[:, 1], 10.0)
-    drawn = whole(solution)[top & (solution.body == solution.body[np.argmax(top)]), 0]
+    drawn = whole(solution)[top & (solution.fields.body == solution.fields.body[np.argmax(top)]), 0]
     assert drawn == pytest.approx(21, abs=0.1)
 
 
@@ -206,7 +206,7 @@ def test_a_block_is_pulled_up_a_slope():
     for step in solution.steps:
         force = step.resultants["interface"].force
         assert force == pytest.approx([-10000.0 * 0.4 / 0.97, 10000.0], rel=2e-5)
-    moved = whole(solution)[solution.body == solution.body[-1]]
+    moved = whole(solution)[solution.fields.body == solution.fields.body[-1]]
     up = 9 * np.sin(np.arctan(0.1))
     assert solution.fields.motion[:, 1].max() == pytest.approx(up, rel=1e-3)
     assert np.isfinite(moved).all()

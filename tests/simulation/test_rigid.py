@@ -72,7 +72,7 @@ def test_a_free_die_under_force_and_moment_tilts_as_a_beam_bends(cells):
         assert np.abs(zone.multiplier - 20 - 10 * zone.centre[:, 0]).max() < 1e-11 * 20
     x, y = solution.mesh.points.T
     exact = -(20 + 10 * x) * (y + 1) / STIFF
-    elastic = (np.abs(y) <= 1) & (x <= 1) & (solution.body < 2)
+    elastic = (np.abs(y) <= 1) & (x <= 1) & (solution.fields.body < 2)
     assert np.abs(solution.displacement[:, 1] - exact)[elastic].max() < 1e-12
     die = next(body for body in solution.rigid if body.body == "die")
     assert die.rotation[2] == pytest.approx(-20 / STIFF, rel=1e-11)

@@ -109,7 +109,9 @@ def mean_gaps(solution):
     x, u = solution.mesh.points[:, 0], solution.displacement[:, 1]
     level = np.abs(solution.mesh.points[:, 1]) < 1e-9
     names = [body.name for body in solution.bodies]
-    upper, lower = (level & (solution.body == names.index(name)) for name in ("left", "base"))
+    upper, lower = (
+        level & (solution.fields.body == names.index(name)) for name in ("left", "base")
+    )
     ends = np.linspace(0, 2, 4)
     places = np.unique(np.concatenate([ends, x[upper], x[lower][x[lower] < 2]]))
     gap = np.zeros(len(places))

@@ -76,7 +76,7 @@ class ExactValues:
     @cached_property
     def part(self) -> np.ndarray:
         """The part (n,) of each node."""
-        return self.exact.node_parts(self.solution.mesh.points, self.solution.body)
+        return self.exact.node_parts(self.solution.mesh.points, self.solution.fields.body)
 
     def displacement(self, nodes: np.ndarray) -> np.ndarray:
         """Displacement (k, dim) at nodes."""

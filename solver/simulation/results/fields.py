@@ -45,7 +45,7 @@ def grid_fields(solution: Solution) -> tuple[dict[str, np.ndarray], dict[str, np
         "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
         "stress": solution.stress,
         "normal_stress": solution.fields.normal_stress,
-        "body": solution.body,
+        "body": solution.fields.body,
     }
     for name in ("reaction", "motion"):
         if (vectors := getattr(solution.fields, name)) is not None:

@@ -240,8 +240,7 @@ class Solution:
     """One solve, complete: everything the result file, the checks and the report need.
 
     `mesh` is the cut mesh (volume cells only; slave sub-faces are in the zones). `displacement` (n,
-    dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body,
-    `body` (n,).
+    dim), `stress` (n, 6) in the order of `solver.mechanics.fem.stress` and averaged per body.
     Where bodies may move far, `mesh` is where the last step brought them, `displacement` is what
     they have beside the `motion` in `fields`, and `earlier` has the positions of the steps before.
     `ended`: why the step after the last one has no solution; `case` then has the steps before.
@@ -251,7 +250,6 @@ class Solution:
     mesh: meshio.Mesh
     displacement: np.ndarray
     stress: np.ndarray
-    body: np.ndarray
     bodies: list[BodyInfo]
     zones: list[ZoneResult]
     steps: list[StepResult]
@@ -287,7 +285,7 @@ class Solution:
     @property
     def deformable(self) -> np.ndarray:
         """Which nodes (n,) belong to bodies that are not rigid."""
-        nodes = self.body >= 0
+        nodes = self.fields.body >= 0
         for group in self.case.rigid:
             members = self.mesh.cell_sets.get(group, [])
             for block, mine in zip(self.mesh.cells, members, strict=False):
