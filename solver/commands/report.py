@@ -68,12 +68,12 @@ def run_saved(options: argparse.Namespace) -> int:
 def add_compare(command: argparse.ArgumentParser) -> None:
     command.add_argument("base", type=Path, metavar="BASE", help="results, or their summary.json")
     command.add_argument("this", type=Path, nargs="?", default=Path("results"), metavar="THIS")
-    command.add_argument("-o", "--output", type=Path, metavar="PAGE.html")
+    command.add_argument("--all", action="store_true", help="list all numbers that changed")
 
 
 def run_compare(options: argparse.Namespace) -> int:
-    from ..report.compare import compare
+    from ..report.compare import Comparison, read_batch, to_markdown
 
-    found, text = compare(options.base, options.this, options.output)
-    print(text)
+    found = Comparison(read_batch(options.base), read_batch(options.this))
+    print(to_markdown(found, options.all))
     return FAILED if found.groups["worse"] else PASSED

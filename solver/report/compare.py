@@ -15,11 +15,9 @@ from typing import Any
 
 from ..case.checks import ROUND_OFF
 from ..system.errors import InputError, hint
-from ..system.files import write_text
 from ..verification.stored import typed_list
 from ..verification.verdict import WORDS, CheckResult
 from . import formats
-from .formats import TEMPLATES, render
 from .rows import Row, natural
 from .tables import md, outcome
 
@@ -245,7 +243,6 @@ def _text(value: Any) -> str:
     return formats.NOTHING if value is None else str(value)
 
 
-PAGE = "compare.html"
 CHANGES = ("solve", "quantity", "before", "now", "change")
 # By the change of a verdict: the words of the outcome, and the heading of the list.
 SAID = {
@@ -262,19 +259,8 @@ HEADINGS = {
     "new": "New, and passed",
     "vanished": "No longer there",
 }
-# Rows of a table in Markdown; the page has them all.
+# Rows of a table, where not all are asked for.
 _MOST = 40
-
-
-def compare(base: Path, this: Path, page: Path | None = None) -> tuple[Comparison, str]:
-    """Compare two batches: write the page, by default into the report of `this`; also as Markdown.
-
-    Raises `InputError` for what is no batch.
-    """
-    found = Comparison(read_batch(base), read_batch(this))
-    page = page or found.this.file.with_name(PAGE)
-    write_text(page, to_html(found))
-    return found, f"{to_markdown(found)}\nReport: {page}"
 
 
 def verdict(found: Comparison) -> str:
@@ -292,38 +278,24 @@ def sections(found: Comparison) -> dict[str, list[Pair]]:
     return {title: pairs for key, title in HEADINGS.items() if (pairs := found.groups[key])}
 
 
-def to_markdown(found: Comparison) -> str:
-    """Verdicts and numbers as Markdown."""
+def to_markdown(found: Comparison, whole: bool = False) -> str:
+    """Verdicts and numbers as Markdown; `whole`: all of them."""
+    most = None if whole else _MOST
     parts = [f"# Two batches\n\n{verdict(found)}\n"]
     for name, batch in (("Before", found.base), ("Now", found.this)):
         parts.append(f"- {name}: `{batch.file}`, {md(batch.outcome)} {md(batch.origin)}")
     parts.append(f"- {found.times}")
     for heading, pairs in sections(found).items():
         changed = [(pair.name, pair.words, pair.row.why) for pair in pairs]
-        parts += [f"\n## {heading}\n", *_table(("solve", "verdict", "reason"), changed)]
+        parts += [f"\n## {heading}\n", *_table(("solve", "verdict", "reason"), changed, most)]
     if found.changes:
         rows = [change.cells for change in found.changes]
-        parts += ["\n## Numbers\n", *_table(CHANGES, rows)]
+        parts += ["\n## Numbers\n", *_table(CHANGES, rows, most)]
     return "\n".join(parts) + "\n"
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], most: int | None) -> list[str]:
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
-    lines += ["| " + " | ".join(map(md, row)) + " |" for row in rows[:_MOST]]
-    return lines + [f"\n… and {len(rows) - _MOST} more."] * (len(rows) > _MOST)
-
-
-def to_html(found: Comparison) -> str:
-    """The page."""
-    named = {"Before": found.base, "Now": found.this}
-    return render(
-        TEMPLATES / "compare.html.jinja",
-        title="Two batches side by side",
-        sortable=True,
-        good=not found.groups["worse"],
-        facts=[(n, f"{b.file}: {b.outcome} {b.origin}") for n, b in named.items()],
-        found=found,
-        outcome=verdict(found),
-        sections=sections(found),
-        changes=CHANGES,
-    )
+    lines += ["| " + " | ".join(map(md, row)) + " |" for row in rows[:most]]
+    left = len(rows) - len(rows[:most])
+    return lines + [f"\n… and {left} more: `--all` lists them."] * (left > 0)
