@@ -19,6 +19,7 @@ is positive definite.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -63,10 +64,27 @@ class StabilisedSystem(ConstrainedSystem):
         return self.condensed.multiplier(force)
 
     def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
-        """The largest force left, with that brought up by gaps that do not fit the pressures."""
+        """The largest force left, or brought up by gaps that do not fit the pressures.
+
+        Springs and bodies give way to such a gap together: where springs are soft and a body is
+        stiff, it is a small pressure that rounding leaves in the forces.
+        """
         system, (force, violation) = self.condensed, self._left(force, violation)
-        pulled = system.coupling.T @ (system.inverse @ violation)
-        return system.imbalance(force - pulled, violation)
+        brought_up = self._flexibility.solve(violation) / system.inverse.diagonal()
+        return max(system.imbalance(force, violation), float(np.abs(brought_up).max(initial=0.0)))
+
+    @cached_property
+    def _flexibility(self) -> Factor:
+        """Gaps by pressures (m, m): S, and about what each one deforms the body."""
+        system, scatter, rows = self.condensed, self.compliance.scatter, np.arange(self._rows)
+        stiffness = np.asarray(system.coupling[rows, system.pivot]).ravel()
+        body = 1 / (stiffness * system.inverse.diagonal() ** 2)
+        springs = scatter.T @ sparse.diags(self.compliance.weight) @ scatter
+        return factorise(sparse.csr_matrix(springs + sparse.diags(body)), least=0.0)
+
+    @property
+    def _rows(self) -> int:
+        return len(self.condensed.pivot)
 
     @property
     def _size(self) -> int:

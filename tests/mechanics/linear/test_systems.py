@@ -189,9 +189,17 @@ def test_one_spring():
 
 
 def test_gaps_that_do_not_fit_the_pressure_are_an_imbalance():
-    """p = 4 opens by s p = 1: a gap of 1.5 is 0.5 too large, which pulls (0, 0.5) on the other."""
+    """p = 4 opens by s p = 1. A gap of 1.5 is 0.5 too large: 0.5 / (1/4 + 1/2), by both."""
     system = stabilise(sparse.csr_matrix([[2.0, -1.0], [-1.0, 1.0]]), G, OWN, SPRING)
-    assert system.imbalance(np.array([-4.0, 0.0]), np.array([1.5])) == pytest.approx(0.5)
+    assert system.imbalance(np.array([-4.0, 0.0]), np.array([1.5])) == pytest.approx(2 / 3)
+
+
+def test_what_soft_springs_leave_is_the_rounding_of_a_pressure():
+    """A body 10⁹ times as stiff as the spring: a gap of 10⁻¹² is 4·10⁻¹² of pressure, not 10⁻³."""
+    stiff = sparse.csr_matrix([[1e9, 0.0], [0.0, 1e9]])
+    system = stabilise(stiff, G, OWN, SPRING)
+    left = system.imbalance(np.array([-4.0, 0.0]), np.array([1.0 + 1e-12]))
+    assert left == pytest.approx(4e-12, rel=1e-3)
 
 
 def test_without_compliance_the_constraint_holds():
