@@ -261,7 +261,10 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False, follows: bool = 
     factor = case.factors[-1]
     held, oblique = split(given.supports(), mesh.points.shape[1])
     constant = [load for load in case.loads if _is_constant(load)]
-    path = tuple(steps_of(case, given.histories(), np.isnan(held), constant)) if case.moving else ()
+    path: tuple[DeckStep, ...] = ()
+    if case.moving:
+        acting = given.histories() or {"": (given.forces(), given.supports().offset)}
+        path = tuple(steps_of(case, acting, np.isnan(held), constant))
     flat = 2 if plane else mesh.points.shape[1]
     pairs = [_paired(case, mesh, i, flat) for i in range(len(case.zones))]
     return Deck(
@@ -310,16 +313,27 @@ def _is_constant(load: Load) -> bool:
 def _refuse(case: Case, follows: bool) -> None:
     if case.moving and not follows:
         raise UnsupportedError("bodies that move far (motion: large): not written for this code")
-    if case.moving and any("normal" in support.fix for support in case.supports):
-        raise UnsupportedError("a support along normals of bodies that move far: not written")
+    _refuse_parts(case)
     if case.moving:
-        _refuse_parts(case)
+        _refuse_moving(case)
         return
     if case.histories:
         raise UnsupportedError("factors of single loads in steps: not written for codes")
     if len(case.steps) > 1 and case.frictional:
         raise UnsupportedError("a path of steps with friction: not written for codes")
-    _refuse_parts(case)
+
+
+def _refuse_moving(case: Case) -> None:
+    for what, found in (
+        ("a support along normals", any("normal" in s.fix for s in case.supports)),
+        ("an interference", any(zone.interference for zone in case.zones)),
+        (
+            "a pressure that varies",
+            any(x.kind == "pressure" and not _is_constant(x) for x in case.loads),
+        ),
+    ):
+        if found:
+            raise UnsupportedError(f"{what} of bodies that move far: not written for codes")
 
 
 def _refuse_parts(case: Case) -> None:

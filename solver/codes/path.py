@@ -41,7 +41,10 @@ def steps_of(
     free: np.ndarray,
     pressures: list[Load],
 ) -> Iterator[DeckStep]:
-    """What acts in each step of named factors; `free` (n, dim): not held, `histories`: by name."""
+    """What acts in each step; `free` (n, dim): not held.
+
+    `histories`: forces (n, dim) and displacements (n_dofs,) by the name that has a factor.
+    """
     for step in case.steps:
         factors = {name: _factor(step, name) for name in histories}
         forces = sum(factors[name] * force for name, (force, _) in histories.items())
@@ -52,6 +55,7 @@ def steps_of(
 
 
 def _factor(step: Step, name: str) -> float:
+    """One without a name has the factor 1 in a step of names."""
     return step.get(name, 1.0) if isinstance(step, dict) else step
 
 

@@ -16,9 +16,10 @@ from solver.codes.verdicts import check_foreign
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
-from tests.simulation.test_motion import slope
+from tests.simulation.test_motion import TEXT, moving, slope
 
 needs_ccx = pytest.mark.skipif(not shutil.which(PROGRAM), reason="no CalculiX")
+PULL, ZONE = TEXT["supports"][1], TEXT["contact"][0]
 CASES = Path(__file__).resolve().parents[2] / "cases/motion"
 
 
@@ -100,6 +101,30 @@ def test_the_steps_of_a_deck(slid):
     assert sum(line.startswith("*STEP, NLGEOM") for line in lines) == 1
     amplitude = lines.index("*AMPLITUDE, NAME=GIVEN0")
     assert lines[amplitude + 1 : amplitude + 10] == [f"{n}., {5.0 * n:.13e}" for n in range(9)]
+
+
+def test_steps_without_names_have_one_factor():
+    loads = [{"group": "press", "pressure": 2.5}]
+    pull = {key: value for key, value in PULL.items() if key != "name"}
+    case = moving(steps=[0.5, 2.0], loads=loads, supports=[TEXT["supports"][0], pull])
+    first, last = deck_of(case, mesh_of(case), follows=True).path
+    assert np.nanmax(first.held) == 3.5
+    assert np.nanmax(last.held) == 14.0
+    assert (first.pressures, last.pressures) == ([1.25], [5.0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"supports": [{"group": "base", "fix": ["normal"]}, PULL]}, "a support along normals"),
+        ({"contact": [ZONE | {"interference": 0.01}]}, "an interference"),
+        ({"loads": [{"group": "press", "pressure": "x", "name": "press"}]}, "a pressure that var"),
+    ],
+)
+def test_what_no_path_has(changes, said):
+    case = moving(**changes)
+    with pytest.raises(UnsupportedError, match=f"{said}.* of bodies that move far"):
+        deck_of(case, mesh_of(case), follows=True)
 
 
 def test_codes_that_follow_no_motion_are_refused_it(slid):
