@@ -176,13 +176,11 @@ EXCLUDED = (
             "slave cells": ("HEXA8",),
             "form": ("exchanged",),
             "materials": ("stiff master",),
-            "supports": ("imposed",),
         },
         "nodes of a stiff slave outnumber those of a soft master: nearly singular",
     ),
     Rule(
         {
-            "motion": ("large",),
             "materials": ("stiff master",),
             "friction": ("slip back",),
             "second zone": ("friction",),
