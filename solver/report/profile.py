@@ -82,7 +82,6 @@ def draw_profile(
     units = solution.case.units
     means = expected(solution, zone)
     where, place = position(solution, zone, along)
-    where = where if along or "degrees" in where else with_unit(where, units.get("length"))
     flat = solution.mesh.points.shape[1] == 2 and along is None
     records = _of_elements(zone, place(solution.mesh.points), place, means)
     records += _of_nodes(solution, zone, place, flat)
@@ -281,20 +280,22 @@ def reference(solution: Solution, key: str) -> Any:
 
 
 def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
-    """The abscissa: its name, and its value (n,) at points (n, dim)."""
+    """The abscissa: its name with its unit, and its value (n,) at points (n, dim)."""
+    length = solution.case.units.get("length")
     if along is not None:
         return mathematics(along.text), along
     if zone.centre.shape[1] == 3:
         flat = laid_flat(zone)
-        return flat.profile_name, flat.profile
+        name = flat.profile_name
+        return name if flat.profile_is_angle else with_unit(name, length), flat.profile
     normals = zone.normal[zone.multiplier > 0]
     if len(normals) and (normals @ normals.T).min() < _STRAIGHT:
         arc = Arc.of(solution.mesh.points, zone)
         x, y = (f"{value:.4g}" for value in arc.ends[0, 0] + 0.0)
-        return f"arc length s from ({x}, {y})", arc
+        return with_unit(f"arc length s from ({x}, {y})", length), arc
     direction = tangent(zone)
     name = next(("xy"[i] for i in (0, 1) if direction[i] > 1 - 1e-9), "s along the interface")
-    return name, lambda points: points @ direction
+    return with_unit(name, length), lambda points: points @ direction
 
 
 @dataclass(frozen=True)

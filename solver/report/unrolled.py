@@ -31,6 +31,7 @@ class LaidFlat:
     profile: Place
     profile_name: str
     around: float = np.inf
+    profile_is_angle: bool = False
 
     def whole(self, places: np.ndarray) -> np.ndarray:
         """Which faces (f,), by the places (f, nodes, 2) of their nodes, do not run over the cut."""
@@ -103,6 +104,7 @@ def _unrolled(axis: np.ndarray, point: np.ndarray, radius: float, pressed: np.nd
         lambda p: np.degrees(angle(p)),
         f"angle around {name} from the middle of the contact, degrees",
         2 * np.pi * radius,
+        profile_is_angle=True,
     )
 
 
@@ -129,6 +131,7 @@ def _from_pole(point: np.ndarray, radius: float, pressed: np.ndarray) -> LaidFla
         lambda p: np.degrees(angle(p)),
         "angle from the middle of the contact, degrees",
         2 * np.pi * radius,
+        profile_is_angle=True,
     )
 
 
