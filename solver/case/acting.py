@@ -187,7 +187,6 @@ class Support(Section, frozen=True):
       foundation), force per displacement at nodes
     together: the components in which all nodes of the group have one displacement, an unknown
     cyclic: the displacement equals another side's, turned or shifted with it
-    bed: stiffness of a bed along all axes: force per area and displacement
     name: the name that `steps` gives factors of the imposed values
     """
 
@@ -195,14 +194,13 @@ class Support(Section, frozen=True):
     spring: _Springs = field(default_factory=dict)
     together: _Together = ()
     cyclic: Cyclic | None = None
-    bed: float = 0.0
     name: Name = ""
     group: Groups = ""
     at: Vector | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        kinds = (self.fix, self.spring, self.together, self.cyclic, self.bed)
+        kinds = (self.fix, self.spring, self.together, self.cyclic)
         if (not self.group) == (self.at is None):
             raise FieldError((), "must be {fix, spring or together, and exactly one of group, at}")
         if sum(map(bool, kinds)) != 1:

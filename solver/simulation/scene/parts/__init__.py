@@ -32,10 +32,6 @@ def parts_of(
     case, parts, strain = groups.case, list[ModelPart](), None
     if any(support.spring for support in case.supports):
         parts.append(groups.springs)
-    if any(support.bed for support in case.supports):
-        from .bed import bed_of
-
-        parts.append(bed_of(groups))
     if any(load.strains for load in case.loads):
         from .strain import StrainFields
 
