@@ -77,8 +77,8 @@ def judge(
     the checks say, where rounding may have left less than four digits (then `attainable`, the
     relative error that rounding alone may cause, is the first reason), where the solve is beyond
     what linear theory takes for granted, or where its mesh does not resolve the pressure; `failed`
-    where a step has no solution. `result`
-    is the name of the result file beside the verdict and `sha256` its hash.
+    where a step has no solution. `result` is the name of the result file beside the verdict and
+    `sha256` its hash.
     """
     accuracy, scatters = Accuracy(solution.quality.accuracy), unresolved(solution)
     unreliable = [reason for reason in (accuracy.reason, scatters) if reason]
@@ -124,7 +124,7 @@ def _solved_as(case: Case) -> SolvedAs:
 
 
 def _units(solution: Solution) -> dict[str, str]:
-    """In 3D, and on the full circle, forces are whole ones."""
+    """The units that the case names, and theirs. In 3D, and on the full circle, forces are whole."""
     spatial = solution.mesh.points.shape[1] == 3 or solution.case.axisymmetric
     return derived(solution.case.units, spatial)
 
@@ -185,6 +185,7 @@ def _identity(case: Case | Path, solved_as: SolvedAs) -> tuple[Problem, Origin]:
     swapped, hexahedra, recovery = solved_as
     read = None if isinstance(case, Path) else case
     name = case.stem if isinstance(case, Path) else case.name
+    zones = read.zones if read else ()
     problem = Problem(
         case=name,
         family=case.parent.resolve().name if isinstance(case, Path) else case.family,
@@ -194,9 +195,7 @@ def _identity(case: Case | Path, solved_as: SolvedAs) -> tuple[Problem, Origin]:
         direction="swapped" if swapped else "first",
         variant=hexahedra or "",
         recovery=recovery or "",
-        zones=[Sides(name=z.name, slave=z.slave, master=z.master) for z in read.zones]
-        if read
-        else [],
+        zones=[Sides(name=z.name, slave=z.slave, master=z.master) for z in zones],
     )
     if read is None:
         return problem, Origin()

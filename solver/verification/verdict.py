@@ -170,7 +170,7 @@ class Body:
 class Problem:
     """What was solved. `units` names those of length, stress, area, force, moment and energy.
 
-    `zones`, with slave and master as solved, and `bodies` are empty without a result.
+    `zones` have slave and master as solved; `bodies` are empty without a result.
     """
 
     case: str = ""

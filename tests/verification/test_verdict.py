@@ -1,14 +1,14 @@
 """The verdict: strict JSON with the same keys whatever happened."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
-from solver.verification.flat import to_json
+from solver.verification.flat import flat, to_json
 from solver.verification.judge import judge, without_result
 from solver.verification.results import write_result
 from solver.verification.stored import read_verdict, unbound, write_verdict
@@ -64,6 +64,17 @@ def test_a_solve_whose_checks_hold_has_passed(tmp_path):
         "reference_faces": 3,
     }
     assert verdict["plan"][0] == ["refinement", "none: by hand", "refinement"]
+
+
+def test_no_two_records_of_a_verdict_share_a_key(tmp_path):
+    """In the flat mapping of the file one would hide the other."""
+
+    def count(record):
+        inner = [getattr(record, f.name) for f in fields(record) if "joined" in f.metadata]
+        return len(fields(record)) - len(inner) + sum(map(count, inner))
+
+    verdict = judge(plane(tmp_path), [])
+    assert len(flat(verdict)) == count(verdict)
 
 
 def test_one_failing_check_fails_the_solve_and_is_the_reason(tmp_path):
