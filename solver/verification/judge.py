@@ -124,7 +124,7 @@ def _solved_as(case: Case) -> SolvedAs:
 
 
 def _units(solution: Solution) -> dict[str, str]:
-    """The units that the case names, and theirs. In 3D, and on the full circle, forces are whole."""
+    """The units of the case and what follows. In 3D, and on the full circle, forces are whole."""
     spatial = solution.mesh.points.shape[1] == 3 or solution.case.axisymmetric
     return derived(solution.case.units, spatial)
 

@@ -10,16 +10,11 @@ positive definite, and the multipliers follow from A by few steps p ← p + w (b
 Fortin, Glowinski, Augmented Lagrangian methods, North-Holland 1983, ch. 1; Golub, Greif, On solving
 block-structured indefinite linear systems, SIAM J. Sci. Comput. 24 (2003) 2076–2092.
 
-Stabilised: constraints give way to pressures that scatter, K x = f + Gᵀ p, G x + S p = b with a
-compliance S = Lᵀ D L of the constraints. With s unknowns r = D L p more, those of springs of the
-stiffness D⁻¹, these are the constraints [G Lᵀ] (x, r) = b of the stiffness diag(K, D⁻¹): the second
-row of its equilibrium is D⁻¹ r = L p. They are condensed like any others, and the condensed matrix
-is positive definite.
+Stabilised: constraints give way to pressures that scatter (`linear.stabilised`).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -27,94 +22,12 @@ from scipy import sparse
 from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .choice import Factor, Shared, factorise, prepare
-from .condensation import CondensedSystem, ConstrainedSystem, condense
+from .condensation import ConstrainedSystem, condense
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .krylov import EPSILON
+from .stabilised import Compliance, stabilise
 from .symmetric_blocks import Stiffness
 from .unknowns import Unknowns
-
-
-@dataclass(frozen=True)
-class Compliance:
-    """S = Lᵀ D L of c closed multipliers: `scatter` L (s, c) and `weight` D (s,)."""
-
-    scatter: sparse.csr_matrix
-    weight: np.ndarray
-
-
-@dataclass(frozen=True, kw_only=True)
-class StabilisedSystem(ConstrainedSystem):
-    """The system `condensed` of displacement and springs (n + s,), for a displacement (n,).
-
-    The springs are the ones of the pressures that balance the forces. See `ConstrainedSystem`.
-    """
-
-    condensed: CondensedSystem
-    compliance: Compliance
-
-    def correction(
-        self, force: np.ndarray, violation: np.ndarray, accuracy: float = EPSILON
-    ) -> np.ndarray:
-        """The change of x under the whole pressure p, which the forces do not contain yet."""
-        force, violation = self._left(force, violation)
-        return self.condensed.correction(force, violation, accuracy)[: self._size]
-
-    def multiplier(self, force: np.ndarray) -> np.ndarray:
-        """From the equilibrium of the pivots."""
-        return self.condensed.multiplier(force)
-
-    def imbalance(self, force: np.ndarray, violation: np.ndarray) -> float:
-        """The largest force left, or brought up by gaps that do not fit the pressures.
-
-        Springs and bodies give way to such a gap together: where springs are soft and a body is
-        stiff, it is a small pressure that rounding leaves in the forces.
-        """
-        system, (force, violation) = self.condensed, self._left(force, violation)
-        brought_up = self._flexibility.solve(violation) / system.inverse.diagonal()
-        return max(system.imbalance(force, violation), float(np.abs(brought_up).max(initial=0.0)))
-
-    @cached_property
-    def _flexibility(self) -> Factor:
-        """Gaps by pressures (m, m): S, and about what each one deforms the body."""
-        system, scatter, rows = self.condensed, self.compliance.scatter, np.arange(self._rows)
-        stiffness = np.asarray(system.coupling[rows, system.pivot]).ravel()
-        body = 1 / (stiffness * system.inverse.diagonal() ** 2)
-        springs = scatter.T @ sparse.diags(self.compliance.weight) @ scatter
-        return factorise(sparse.csr_matrix(springs + sparse.diags(body)), least=0.0)
-
-    @property
-    def _rows(self) -> int:
-        return len(self.condensed.pivot)
-
-    @property
-    def _size(self) -> int:
-        return self.condensed.coupling.shape[1] - len(self.compliance.weight)
-
-    def _left(self, force: np.ndarray, violation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (n + s,) and violation (m,) left, the springs in equilibrium with the pressure."""
-        stretch = self.compliance.scatter @ self.multiplier(force)
-        moved = (stretch.T * self.compliance.weight).T
-        return np.concatenate([force, -stretch]), violation - self.compliance.scatter.T @ moved
-
-
-def stabilise(
-    matrix: Stiffness,
-    constraints: sparse.csr_matrix,
-    own: np.ndarray,
-    compliance: Compliance,
-    unknowns: Unknowns | None = None,
-    gave_up: str = "",
-    shared: Shared | None = None,
-) -> StabilisedSystem:
-    """Condense K (n, n) and its springs by G (m, n) and the `compliance`; see `condense`.
-
-    Raises SolveError where a constraint has no unknown of its own, or the system is singular.
-    """
-    whole = sparse.hstack([constraints, compliance.scatter.T], format="csr")
-    springs = 1 / compliance.weight
-    condensed = condense(matrix, whole, own, unknowns, gave_up, shared, springs)
-    return StabilisedSystem(factor=condensed.factor, condensed=condensed, compliance=compliance)
-
 
 _NOTHING_OWN = "constraints without an unknown of their own: added to the stiffness with a weight"
 # A step leaves about 1 / (w λ) of a violation, with the smallest eigenvalue λ of Ĝ D⁻¹ Ĝᵀ, whose

@@ -5,14 +5,8 @@ import pytest
 from scipy import sparse
 
 from solver.lac.errors import SolveError
-from solver.mechanics.linear.systems import (
-    Compliance,
-    Part,
-    StabilisedSystem,
-    Systems,
-    augment,
-    stabilise,
-)
+from solver.mechanics.linear.stabilised import Compliance, StabilisedSystem, stabilise
+from solver.mechanics.linear.systems import Part, Systems, augment
 from solver.mechanics.multigrid import multigrid
 from solver.mechanics.multigrid.hierarchy import Interface, Level
 from solver.mechanics.multigrid.multigrid import Multigrid
