@@ -116,6 +116,16 @@ class Case:
         """Whether a contact zone has friction."""
         return any(zone.friction for zone in self.zones)
 
+    @property
+    def solved_as(self) -> tuple[bool, str | None, str | None]:
+        """The arguments of `as_solved` that made it."""
+        return self.swapped, self.hexahedra, self.recovery
+
+    @property
+    def job(self) -> str:
+        """The name of this solve, as of its folder and its file of accepted values."""
+        return job_name(self.name, *self.solved_as)
+
     def zone_named(self, name: str) -> Zone:
         """The contact zone of a name."""
         return next(zone for zone in self.zones if zone.name == name)

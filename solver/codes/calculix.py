@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TypeAlias
 
 import meshio
 import numpy as np
@@ -49,6 +49,7 @@ _CONTROLS = ("*CONTROLS, PARAMETERS=FIELD", f"0.005, {_CORRECTION:g}")
 # Of a step on which bodies move far, the largest part that is solved at once, and the most parts.
 _PART, _MOST = 0.25, 1000
 _NAME = "deck"
+_Series: TypeAlias = tuple[float, ...]
 
 
 class CalculiX:
@@ -200,45 +201,47 @@ def _step(deck: Deck) -> Iterator[str]:
 def _path(deck: Deck) -> Iterator[str]:
     """One step of bodies that move far, a unit of its time for each step of the case.
 
-    Another step would begin without the contact of the one before. See `_amplitudes`.
+    Another step would begin without the contact of the one before.
     """
-    names, last = _amplitudes(deck), len(deck.path)
+    last = len(deck.path)
     yield from (f"*STEP, NLGEOM, INC={_MOST * last}", "*STATIC", f"{_PART:g}, {last}., , {_PART:g}")
     yield from (*_CONTROLS, "*BOUNDARY, OP=NEW")
-    fixed = np.array([step.held for step in deck.path])
-    for node, axis, _ in deck.fixed():
-        if not fixed[:, node, axis].any():
-            yield f"{node + 1}, {axis + 1}, {axis + 1}, 0."
-    for series, name in names.items():
-        where = [f"{node + 1}, {axis + 1}" for node, axis in _like(fixed, series)]
-        if where:
-            yield f"*BOUNDARY, AMPLITUDE={name}"
-            yield from (f"{one}, {one.split()[1]}, 1." for one in where)
-        where = [f"{n + 1}, {a + 1}" for n, a in _like([s.forces for s in deck.path], series)]
-        if where:
-            yield f"*CLOAD, AMPLITUDE={name}"
-            yield from (f"{one}, 1." for one in where)
-    for number, (faces, _) in enumerate(deck.pressures):
-        series = tuple(step.pressures[number] for step in deck.path)
-        if any(series):
-            yield f"*DLOAD, AMPLITUDE={names[series]}"
-            yield from (f"{element}, P{face}, 1." for element, face in _faces(deck, faces))
+    held, forces, names = _by_series(deck, "held"), _by_series(deck, "forces"), _amplitudes(deck)
+    still = held.pop(last * (0.0,), [])
+    yield from (f"{node}, {axis}, {axis}, 0." for node, axis in still)
+    for series, where in held.items():
+        yield f"*BOUNDARY, AMPLITUDE={names[series]}"
+        yield from (f"{node}, {axis}, {axis}, 1." for node, axis in where)
+    forces.pop(last * (0.0,), None)
+    for series, where in forces.items():
+        yield f"*CLOAD, AMPLITUDE={names[series]}"
+        yield from (f"{node}, {axis}, 1." for node, axis in where)
+    for (faces, _), series in zip(deck.pressures, _pressures(deck), strict=True):
+        if not any(series):
+            continue
+        yield f"*DLOAD, AMPLITUDE={names[series]}"
+        yield from (f"{element}, P{face}, 1." for element, face in _faces(deck, faces))
 
 
-def _like(steps: Sequence[np.ndarray] | np.ndarray, series: tuple[float, ...]) -> Iterator[Any]:
-    """Node and axis where fields (n, dim) of the steps have a series of values."""
-    same = (np.array(steps) == np.array(series)[:, None, None]).all(axis=0)
-    return zip(*map(np.ndarray.tolist, np.nonzero(same)), strict=True)
+def _by_series(deck: Deck, name: str) -> dict[_Series, list[tuple[int, int]]]:
+    """Node and axis, from 1, by the values of a field in the steps; not where it has none."""
+    found: dict[_Series, list[tuple[int, int]]] = {}
+    values = np.stack([getattr(step, name) for step in deck.path], axis=-1)
+    for node, axis in np.argwhere(~np.isnan(values).any(axis=-1)).tolist():
+        series = tuple(values[node, axis].tolist())
+        found.setdefault(series, []).append((node + 1, axis + 1))
+    return found
 
 
-def _amplitudes(deck: Deck) -> dict[tuple[float, ...], str]:
+def _pressures(deck: Deck) -> list[_Series]:
+    return list(zip(*(step.pressures for step in deck.path), strict=True))
+
+
+def _amplitudes(deck: Deck) -> dict[_Series, str]:
     """The names of all series of values, one for each step, that displacements and loads have."""
-    fields = [np.array([getattr(s, name) for s in deck.path]) for name in ("held", "forces")]
-    columns = [field.reshape(len(deck.path), -1).T for field in fields]
-    columns.append(np.array([step.pressures for step in deck.path]).T)
-    found = {tuple(row.tolist()): "" for column in columns for row in column if row.any()}
-    kept = [series for series in found if not np.isnan(series).any()]
-    return {series: f"GIVEN{number}" for number, series in enumerate(kept)}
+    found = [*_by_series(deck, "held"), *_by_series(deck, "forces"), *_pressures(deck)]
+    acting = dict.fromkeys(filter(any, found))
+    return {series: f"GIVEN{number}" for number, series in enumerate(acting)}
 
 
 def _amplitude_lines(deck: Deck) -> Iterator[str]:

@@ -263,8 +263,7 @@ def deck_of(case: Case, mesh: meshio.Mesh, layer: bool = False, follows: bool = 
     constant = [load for load in case.loads if _is_constant(load)]
     path: tuple[DeckStep, ...] = ()
     if case.moving:
-        acting = given.histories() or {"": (given.forces(), given.supports().offset)}
-        path = tuple(steps_of(case, acting, np.isnan(held), constant))
+        path = tuple(steps_of(given, np.isnan(held), constant))
     flat = 2 if plane else mesh.points.shape[1]
     pairs = [_paired(case, mesh, i, flat) for i in range(len(case.zones))]
     return Deck(

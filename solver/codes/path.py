@@ -9,19 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import meshio
 import numpy as np
 
-from ..case.acting import Load, Step
+from ..case.acting import Load
 from ..case.model import Case
-from ..simulation.scene.moved import Frames, best_turn
+from ..simulation.scene.moved import Frames, in_step
 from ..simulation.scene.scene import replace_points
 from ..simulation.scene.selections import with_groups
 from ..system.errors import InputError
 
 if TYPE_CHECKING:
+    from ..simulation.scene.attributes import Attributes
     from .foreign import Field, ForeignResult
     from .placing import Placed, Placer
 
@@ -35,28 +37,15 @@ class DeckStep:
     pressures: list[float]
 
 
-def steps_of(
-    case: Case,
-    histories: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    free: np.ndarray,
-    pressures: list[Load],
-) -> Iterator[DeckStep]:
-    """What acts in each step; `free` (n, dim): not held.
-
-    `histories`: forces (n, dim) and displacements (n_dofs,) by the name that has a factor.
-    """
+def steps_of(given: Attributes, free: np.ndarray, pressures: list[Load]) -> Iterator[DeckStep]:
+    """What acts in each step; `free` (n, dim): not held."""
+    case, forces = given.case, cache(given.forces)
+    offsets = cache(lambda name: given.supports(name).offset)
     for step in case.steps:
-        factors = {name: _factor(step, name) for name in histories}
-        forces = sum(factors[name] * force for name, (force, _) in histories.items())
-        offset = sum(factors[name] * offset for name, (_, offset) in histories.items())
-        held = np.where(free, np.nan, np.asarray(offset).reshape(free.shape))
+        offset = in_step(step, case.histories, offsets)
+        held = np.where(free, np.nan, offset.reshape(free.shape))
         values = [load.factor(step) * float(load.value) for load in pressures]
-        yield DeckStep(held, np.asarray(forces), values)
-
-
-def _factor(step: Step, name: str) -> float:
-    """One without a name has the factor 1 in a step of names."""
-    return step.get(name, 1.0) if isinstance(step, dict) else step
+        yield DeckStep(held, in_step(step, case.histories, forces), values)
 
 
 def at_last_position(
@@ -79,9 +68,7 @@ def at_last_position(
         mine = moved.body == number
         places = moved.places[mine]
         now = places + moved.values[mine, : model.dim]
-        middle, goal = places.mean(axis=0), now.mean(axis=0)
-        turn = best_turn(places - middle, now - goal)
-        frames = frames.with_body(number, turn, goal - turn @ middle)
+        frames = frames.following(number, places, now, around_axis=model.case.axisymmetric)
     fields: dict[str, Any] = {
         name: _moved(getattr(foreign, name), of, frames) for name, of in placed.items()
     }

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..case.model import job_name
 from ..lac.cells.catalogue import BY_MESHIO
 from ..simulation.results.records import Cost
 from ..system.files import seal, write_text
@@ -144,8 +143,7 @@ def check_foreign(
 
 def folder_of(results: Path, case: Case, code: str) -> Path:
     """The folder of a code's verdict in a folder of results."""
-    job = job_name(case.name, case.swapped, case.hexahedra, case.recovery)
-    return results / case.family / f"{job}@{code}"
+    return results / case.family / f"{case.job}@{code}"
 
 
 def store(
@@ -187,7 +185,7 @@ def without_foreign(
     `word`: refused (it cannot express the case, or is not installed), failed (no convergence) or
     crashed (a crash, a hang).
     """
-    verdict = without_result(word, reason, case, (case.swapped, case.hexahedra, case.recovery))
+    verdict = without_result(word, reason, case, case.solved_as)
     named = _named(verdict, code, version, settings or {})
     return replace(named, cost=Cost(seconds={} if seconds is None else {"total": seconds}))
 

@@ -209,9 +209,10 @@ def with_status(
     wrong: Callable[[T], bool],
     again: Callable[[T], S],
 ) -> T | None:
-    """What `correct` finds, from a start whose status is not `wrong` under it.
+    """Correct until the status of what is found is right, at most three times.
 
-    Where it is, `again` finds another start. None where there is none, or after three of them.
+    `correct` a start; where the status is `wrong` under the correction, `again` makes a new start.
+    None where a correction fails, or the third one still has a wrong status.
 
     >>> with_status(1, lambda n: 10 * n, lambda found: found < 20, lambda found: found // 10 + 1)
     20

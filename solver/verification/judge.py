@@ -94,7 +94,7 @@ def judge(
         unverified = NOT_JUDGED
     seconds = solution.cost.seconds
     total = seconds.get("total", sum(seconds.values()))
-    problem, origin = _identity(solution.case, _solved_as(solution.case))
+    problem, origin = _identity(solution.case, solution.case.solved_as)
     return Verdict(
         problem=replace(problem, bodies=_bodies(solution), units=_units(solution)),
         verdict=word,
@@ -117,10 +117,6 @@ def judge(
         cost=replace(solution.cost, seconds={**seconds, "total": total}),
         files=Files(result=result, result_sha256=sha256, provenance=dict(provenance or {})),
     )
-
-
-def _solved_as(case: Case) -> SolvedAs:
-    return case.swapped, case.hexahedra, case.recovery
 
 
 def _units(solution: Solution) -> dict[str, str]:

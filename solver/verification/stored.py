@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 
@@ -12,8 +12,6 @@ from ..system.errors import InputError
 from ..system.files import seal_of, write_text
 from .flat import DIGEST, deep, digest, flat_key, to_json
 from .verdict import WORDS, Verdict
-
-T = TypeVar("T")
 
 
 def write_verdict(path: str | Path, verdict: Verdict) -> None:
@@ -30,7 +28,7 @@ def read_verdict(path: str | Path) -> Verdict:
         raise InputError(path, "file", None, "there is no verdict: the job was ended") from None
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(path, " ".join(str(error).split())) from None
-    verdict = typed(Verdict, content, path)
+    verdict = typed(content, path)
     if content.pop(DIGEST, None) != digest(content):
         raise _damaged(path, "it is not as it was written")
     if verdict.verdict not in WORDS:
@@ -55,18 +53,19 @@ def unbound(verdict: Verdict, path: Path) -> str:
     return ""
 
 
-def typed(kind: type[T], content: object, where: Path, at: str = "") -> T:
-    """Plain values, as `json.loads` returns them, as typed verdicts; `InputError` otherwise.
+def typed(content: object, where: Path, at: str = "") -> Verdict:
+    """Plain values, as `json.loads` returns them, as a verdict; `InputError` otherwise.
 
     Unknown keys are ignored. A key that is missing or null has its default, NaN for a number. `at`
     is the place of the values in the file.
     """
     given = _without_nulls(content)
     try:
-        return msgspec.convert(deep(kind, given) if isinstance(given, dict) else given, kind)
+        nested = deep(Verdict, given) if isinstance(given, dict) else given
+        return msgspec.convert(nested, Verdict)
     except msgspec.ValidationError as error:
         said, _, place = str(error).partition(" - at ")
-        key = flat_key(kind, place.strip("`").removeprefix("$").removeprefix("."))
+        key = flat_key(Verdict, place.strip("`").removeprefix("$").removeprefix("."))
         key = f"{at}.{key}".strip(".") or "file"
         raise InputError(where, key, None, f"not as in a verdict: {said}") from None
 
@@ -75,7 +74,7 @@ def typed_list(content: object, where: Path) -> list[Verdict]:
     """Verdicts in a list, as a summary has them; `InputError` where they are none."""
     if not isinstance(content, list):
         raise InputError(where, "file", None, "not as in a verdict: must be a list")
-    return [typed(Verdict, one, where, f"[{number}]") for number, one in enumerate(content)]
+    return [typed(one, where, f"[{number}]") for number, one in enumerate(content)]
 
 
 def _without_nulls(value: Any) -> Any:

@@ -23,7 +23,7 @@ from tests.pairs.options import plain_in
 class Fault:
     """`what` is wrong where `options` meet; `patch` makes `name` of `owner` faulty.
 
-    `cells` of both sides, where it takes others than the plain ones.
+    `cells` of both sides, where it takes others than the plain ones; `ends`: what comes of it.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Fault:
     patch: Callable[[Any], Any]
     space: str = "strain"
     cells: str = ""
+    ends: str = "wrong"
 
     @property
     def plain(self) -> dict[str, str]:
@@ -126,6 +127,7 @@ FAULTS = (
         _normalised_one_by_one,
         "solid",
         "TETRA10",
+        "refused",
     ),
     Fault(
         "slips-of-all-zones",
@@ -137,7 +139,7 @@ FAULTS = (
     ),
     Fault(
         "overlap-of-a-clearance",
-        "the clearance of the last zone alone tells that meshes may lie in one another",
+        "only the last zone's clearance lets its meshes overlap",
         {"gap": "clearance, overlap", "second zone": "plain"},
         validity,
         "_apart",

@@ -3,13 +3,12 @@
 from pathlib import Path
 
 from solver.verification.stored import typed, write_verdict
-from solver.verification.verdict import Verdict
 
 
 def record(content):
     """The typed verdict of a mapping; family, job and word are made up where they are missing."""
     base = {"family": "fam", "job": "job", "verdict": "passed"}
-    return typed(Verdict, base | content, Path("verdict.json"))
+    return typed(base | content, Path("verdict.json"))
 
 
 def put(path, content):

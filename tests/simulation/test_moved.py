@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from solver.simulation.scene.moved import Frames, best_turn, rotation_by, rotation_vector
+from solver.simulation.scene.moved import Frames, _best_turn, rotation_by, rotation_vector
 from solver.system.errors import InputError
 from tests.simulation.test_motion import TEXT, moving
 
@@ -18,7 +18,7 @@ angles = st.floats(-3.0, 3.0)
 def test_a_rotation_is_found_whatever_its_angle(seed, vector):
     before = np.random.default_rng(seed).normal(size=(6, 3))
     turn = Rotation.from_rotvec(vector).as_matrix()
-    found = best_turn(before, before @ turn.T)
+    found = _best_turn(before, before @ turn.T)
     assert found == pytest.approx(turn, abs=1e-12)
     assert rotation_by(rotation_vector(found), 3) == pytest.approx(found, abs=1e-12)
 
@@ -26,9 +26,19 @@ def test_a_rotation_is_found_whatever_its_angle(seed, vector):
 def test_a_flat_surface_turns_without_a_reflection():
     flat = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 0]]) - [0.5, 1, 0]
     turn = Rotation.from_rotvec([0.3, -0.8, 1.1]).as_matrix()
-    found = best_turn(flat, flat @ turn.T)
+    found = _best_turn(flat, flat @ turn.T)
     assert found == pytest.approx(turn, abs=1e-12)
     assert np.linalg.det(found) == pytest.approx(1.0)
+
+
+def test_a_ring_that_widens_moves_along_its_axis_alone():
+    now = np.array([[1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0]])
+    then = now * [1.1, 1.0] + [0.0, 3.0]
+    frames = Frames.still(1, 2).following(0, now, then, around_axis=True)
+    assert frames.turn[0] == pytest.approx(np.eye(2))
+    assert frames.shift[0] == pytest.approx([0.0, 3.0])
+    free = Frames.still(1, 2).following(0, now, then)
+    assert free.shift[0] == pytest.approx([0.15, 3.0])
 
 
 def test_frames_stay_orthogonal_over_many_steps():

@@ -61,15 +61,12 @@ class StabilisedSystem(ConstrainedSystem):
     @cached_property
     def _flexibility(self) -> Factor:
         """Gaps by pressures (m, m): S, and about what each one deforms the body."""
-        system, scatter, rows = self.condensed, self.compliance.scatter, np.arange(self._rows)
+        system, scatter = self.condensed, self.compliance.scatter
+        rows = np.arange(len(system.pivot))
         stiffness = np.asarray(system.coupling[rows, system.pivot]).ravel()
         body = 1 / (stiffness * system.inverse.diagonal() ** 2)
         springs = scatter.T @ sparse.diags(self.compliance.weight) @ scatter
         return factorise(sparse.csr_matrix(springs + sparse.diags(body)), least=0.0)
-
-    @property
-    def _rows(self) -> int:
-        return len(self.condensed.pivot)
 
     @property
     def _size(self) -> int:

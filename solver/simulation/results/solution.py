@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...case.model import job_name
 from .forces import Reaction, Resultants, RigidMotion
 from .records import Cost, Fields, Places, Quality, Scalars
 
@@ -307,4 +306,4 @@ class Solution:
     @property
     def job(self) -> str:
         """The name of this solve, as of its folder and its file of accepted values."""
-        return job_name(self.case.name, self.swapped, self.hexahedra, self.case.recovery)
+        return self.case.job

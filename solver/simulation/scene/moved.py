@@ -60,6 +60,28 @@ class Frames:
         turns[number], shifts[number] = left @ right, shift
         return Frames(turns, shifts)
 
+    def following(
+        self,
+        number: int,
+        now: np.ndarray,
+        then: np.ndarray,
+        share: np.ndarray | None = None,
+        around_axis: bool = False,
+    ) -> "Frames":
+        """With the rigid motion that best brings places `now` (n, dim) of a body to `then`.
+
+        By least squares, each place with its `share` (n,). `around_axis`: only along y.
+        """
+        share = np.ones(len(now)) if share is None else share
+        middle, goal = (share @ each / share.sum() for each in (now, then))
+        turn = np.eye(now.shape[1])
+        if around_axis:
+            goal[0] = middle[0]
+        else:
+            turn = _best_turn((now - middle) * share[:, None], then - goal)
+        shift = turn @ (self.shift[number] - middle) + goal
+        return self.with_body(number, turn @ self.turn[number], shift)
+
 
 class Moved(Attributes):
     """The groups of a case on its mesh as the bodies moved, and what acts there in a step.
@@ -313,18 +335,11 @@ def settled(groups: Moved, displacement: np.ndarray, held: np.ndarray) -> Frames
         mine = body == number
         share = weight[mine] if weight[mine].any() else np.ones(mine.sum())
         now, then = points[mine], points[mine] + displacement[mine]
-        middle, goal = (share @ each / share.sum() for each in (now, then))
-        turn = np.eye(points.shape[1])
-        if groups.axisymmetric:
-            goal[0] = middle[0]
-        else:
-            turn = best_turn((now - middle) * share[:, None], then - goal)
-        shift = turn @ (frames.shift[number] - middle) + goal
-        frames = frames.with_body(number, turn @ frames.turn[number], shift)
+        frames = frames.following(number, now, then, share, groups.axisymmetric)
     return frames
 
 
-def best_turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def _best_turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The rotation (dim, dim) of vectors (n, dim) that fits others best (Kabsch, 1976)."""
     left, _, right = np.linalg.svd(before.T @ after)
     sign = np.eye(len(left))
