@@ -15,6 +15,12 @@ from .typed import ONCE, FieldError, Number, Positive, Section, Text
 # A load factor, or the factors of named loads and supports.
 Step = float | dict[str, float]
 
+
+def factor_of(name: str, step: Step) -> float:
+    """The factor that a step gives a name: of loads, supports and bodies."""
+    return step.get(name, 1.0) if isinstance(step, dict) else step
+
+
 Name = Annotated[
     str,
     Meta(
@@ -279,7 +285,7 @@ class Load(Section, frozen=True):
 
     def factor(self, step: Step) -> float:
         """Its factor in a step."""
-        return step.get(self.name, 1.0) if isinstance(step, dict) else step
+        return factor_of(self.name, step)
 
 
 SURFACES = ("plane", "sphere", "cylinder", "parabola")
@@ -386,6 +392,10 @@ class Rigid(Section, frozen=True):
         given = {"reference": self.reference}
         given |= {f"{self.surface}.{key}": value for key, value in self.values.items()}
         return [(key, value) for key, value in given.items() if isinstance(value, tuple)]
+
+    def factor(self, step: Step) -> float:
+        """Its factor in a step."""
+        return factor_of(self.name, step)
 
     @property
     def moves(self) -> bool:

@@ -136,6 +136,26 @@ class Case:
         states = self.solution.states if self.solution else ()
         return dict(zip(self.histories, states, strict=True)) if states else {}
 
+    def exact_in(self, step: Step) -> "ExactSolution | None":
+        """The exact solution in a step: where bodies move far it goes along with the rigid one.
+
+        `solution` is that of the last step.
+        """
+        if self.solution is None or not self.moving:
+            return self.solution
+        return self.solution.moved(self._way(step) - self._way(self.steps[-1]))
+
+    def at_its_end(self) -> "Case":
+        """With the exact solution of the last step in the place of that on the mesh as given."""
+        if self.solution is None or not self.moving:
+            return self
+        return replace(self, solution=self.solution.moved(self._way(self.steps[-1])))
+
+    def _way(self, step: Step) -> float:
+        """How far along x the rigid body is in a step that the exact solution goes along with."""
+        (body,) = self.rigid.values()
+        return body.move.get("x", 0.0) * body.factor(step)
+
     @property
     def acting(self) -> dict[str, str]:
         """The groups of supports and of the sides they copy, and of loads on surfaces, by key."""

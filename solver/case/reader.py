@@ -56,7 +56,7 @@ def parse_case(text: str, path: Path) -> Case:
     content = parse_mapping(text, path)
     case = _Reader(path, content, read_as(CaseFile, content, path)).case(text)
     check_rules(case)
-    return case
+    return case.at_its_end()
 
 
 def check_mesh_file(case: Case) -> None:

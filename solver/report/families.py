@@ -14,6 +14,8 @@ tolerance: What the tolerances of the cases are made of.
 figures:                       # the solves whose pressure is drawn along the interface;
   - {job: block-quad8}         # left out: the first of each kind of reference and dimension
   - {job: block-hexa8, along: sqrt(x**2 + y**2), caption: what to look at}
+paths:                         # solves whose largest pressures are drawn over the steps, together
+  - {jobs: [block-slides, block-slides-nodal], caption: what to look at}
 reference_code:                # another code's own errors, drawn beside the solves' errors
   - {name: code_aster, version: "14.6", error: 4.0e-13, remark: most cases}
   - {name: code_aster, version: "14.6", error: 2.4e-9, slave: [HEXA8],
@@ -55,6 +57,13 @@ class Figure(Section, frozen=True):
         return Expression(self.along) if self.along else None
 
 
+class Along(Section, frozen=True):
+    """Solves whose largest pressures are drawn over the steps, in one chart."""
+
+    jobs: Annotated[tuple[str, ...], Meta(min_length=1, description="names of solves")]
+    caption: str = ""
+
+
 class CodeError(Section, frozen=True):
     """Another code's own error.
 
@@ -83,6 +92,7 @@ class FamilyFile(Section, frozen=True):
     reference: str = ""
     tolerance: str = ""
     figures: tuple[Figure, ...] = ()
+    paths: tuple[Along, ...] = ()
     reference_code: tuple[CodeError, ...] = ()
 
 

@@ -109,12 +109,18 @@ def rigid_surface(
         places[:, 0] = np.maximum(places[:, 0], 0.0)
     into = -_unit(surface.gradient(places))
     places += surface.distance(places, into)[0][:, None] * into
-    # A rigid motion is linear, as at the nodes that carry it.
-    carried = np.c_[points[own], np.ones(own.sum())]
-    linear = np.linalg.lstsq(carried, solution.displacement[own], rcond=None)[0]
-    moved = np.c_[places, np.ones(len(places))] @ linear
+    moved = carried(places, points[own], solution.displacement[own])
     local = [(k, np.searchsorted(used, f), np.full(len(f), number)) for k, f, _ in faces]
     return three(places), three(moved), local, three(_unit(surface.gradient(places)))
+
+
+def carried(places: np.ndarray, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """What nodes (k, dim) of a rigid body have, `values` (k, dim), at its places (n, dim).
+
+    A rigid motion is linear.
+    """
+    linear = np.linalg.lstsq(np.c_[nodes, np.ones(len(nodes))], values, rcond=None)[0]
+    return np.asarray(np.c_[places, np.ones(len(places))] @ linear)
 
 
 def zone_fields(solution: Solution, zone: ZoneResult) -> dict[str, np.ndarray]:

@@ -29,7 +29,7 @@ from .case_picture import SIZES, draw_case
 from .charts import Chart
 from .formats import TEMPLATES, render
 from .layout import color_map, mean_normal
-from .parts import DrawnPart, parts, three, zone_fields
+from .parts import DrawnPart, carried, parts, three, zone_fields
 from .profile import draw_profile, reference
 from .rows import Row
 from .view import AZIMUTH, ELEVATION
@@ -112,13 +112,14 @@ def _earlier(solution: Solution, part: DrawnPart) -> Iterator[Fields]:
     for position in solution.earlier:
         points = three(position.points)
         moved = three(position.at_points["displacement"][:, :dim])
-        if part.zone is None:
-            there = part.used if part.meshed else None
-        else:
+        there = part.used
+        if part.zone is not None:
             there = np.concatenate([nodes.ravel() for _, nodes, _ in part.faces])
-        if there is None:  # a surface that the case gives stays where the last step has it
-            yield {}
-            continue
+        elif not part.meshed:  # a surface that the case gives goes as the nodes of its body
+            own = solution.fields.body == part.body
+            nodes, places = solution.mesh.points[own], part.points[:, :dim]
+            moved = three(carried(places, nodes, moved[own, :dim]))
+            points = three(carried(places, nodes, position.points[own]))
         found = {"points": points[there], "displacement": moved[there]}
         if part.zone is not None:
             pressure = position.of_zone("pressure", number, len(part.zone.area))

@@ -1,9 +1,11 @@
 """Contact over the steps of a path: its largest pressure, and its mean, the force over the area."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..verification.units import with_unit
-from .charts import BLUE, ORANGE, Axis, Chart, Look, series_chart
+from .charts import BLUE, MANY, ORANGE, Axis, Chart, Look, series_chart
 from .rows import Row
 
 # Fewer steps are no path.
@@ -36,3 +38,23 @@ def positions(row: Row) -> Chart | str:
         tips={"zone": "zone"},
         height=200,
     )
+
+
+def side_by_side(rows: Sequence[Row], name: str) -> Chart | str:
+    """The largest pressures of solves over their steps; empty where none has a path."""
+    records = [
+        {"series": row.verdict.problem.title, "step": one.step, "value": max(one.pressure)}
+        for row in rows
+        for one in row.verdict.values.forces
+        if one.name.startswith(_ZONE) and one.pressure
+    ]
+    if not records:
+        return ""
+    unit = rows[0].verdict.problem.units.get("stress")
+    shapes = ("circle", "square", "triangle-up", "diamond")
+    titles = dict.fromkeys(str(record["series"]) for record in records)
+    looks = {
+        title: Look(MANY[i % len(MANY)], shapes[i % len(shapes)]) for i, title in enumerate(titles)
+    }
+    value = Axis("value", with_unit("largest pressure", unit))
+    return series_chart(name, "Largest pressure", records, Axis("step", "step"), value, looks)

@@ -15,6 +15,7 @@ from .errors import draw_errors, drawn, floor
 from .families import CodeError, Family, Figure, page_name, read_family
 from .formats import KINDS
 from .pictures import name_of, picture, profile
+from .positions import side_by_side
 from .rows import Row, counted, families, ours
 from .tables import outcome
 
@@ -144,6 +145,16 @@ class FamilySection:
             picture(row, self.pictures)  # both of one reading of the result
             drawing = profile(row, self.pictures, figure.expression)
             found.append(Profile(row, drawing, figure.caption))
+        return found
+
+    @cached_property
+    def paths(self) -> list[tuple[Chart | str, str]]:
+        """Charts over the steps of the solves that the family names together, with captions."""
+        by_name, found = {row.name: row for row in self.rows}, []
+        for i, figure in enumerate(self.family.paths, start=1):
+            rows = [by_name[job] for job in figure.jobs if job in by_name]
+            if chart := side_by_side(rows, f"path-{i}"):
+                found.append((chart, figure.caption))
         return found
 
     @property

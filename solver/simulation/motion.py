@@ -103,6 +103,8 @@ def _in_place(
 ) -> _Solved:
     """A step solved where its bodies are; SolveError where it has no solution or no place."""
     rest, faces = model.groups, model.contact_faces
+    if exact := rest.case.exact_in(step):
+        rest = rest.with_solution(exact)
     wanted, held = predicted(rest, step, frames)
     frames = _followed(rest, faces, frames, wanted)
     for count in range(1, _ROUNDS + 1):

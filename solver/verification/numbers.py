@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import meshio
 import numpy as np
 
 from ..case.expressions import evaluate
@@ -132,23 +134,41 @@ def at_positions(quantity: str) -> Sampler:
         number = [one.name for one in solution.zones].index(zone.name)
         # Vectors are given on the surface that the case lists as slave.
         sign = -1.0 if solution.swapped and quantity == "friction_traction" else 1.0
-        values, places, where = [], [], []
+        values, expected, where = [], [], []
         count, dim = len(zone.area), solution.mesh.points.shape[1]
         for step, position in enumerate(solution.earlier, start=1):
             covered = position.of_zone("coverage", number, count) > MIN_COVERAGE
             field = sign * position.of_zone(quantity, number, count).reshape(count, -1)
             values.append(field[covered, :dim])
-            places.append(_at_macro(zone, position.points)[covered])
+            expected.append(_there(solution, zone, reference, quantity, step)[covered])
             elements = np.flatnonzero(covered)
             where += [f"macro-element {element} in step {step}" for element in elements]
         if not where:
             return None
-        found, centres = np.concatenate(values), np.concatenate(places)
-        given = reference if isinstance(reference, tuple) else (reference,)
-        expected = np.stack([evaluate(one, centres) for one in given], axis=1)
-        return Sample(found.T.ravel(), expected.T.ravel(), lambda i: where[i % len(where)])
+        found, known = np.concatenate(values), np.concatenate(expected)
+        return Sample(found.T.ravel(), known.T.ravel(), lambda i: where[i % len(where)])
 
     return sample
+
+
+def _there(
+    solution: Solution, zone: ZoneResult, reference: Reference, quantity: str, step: int
+) -> np.ndarray:
+    """What the reference has (m, components) on macro-elements where a step left the bodies."""
+    points = solution.earlier[step - 1].points
+    if isinstance(reference, ExactValues):
+        exact = solution.case.exact_in(solution.case.steps[step - 1])
+        assert exact is not None
+        then = replace(solution, mesh=meshio.Mesh(points, solution.mesh.cells))
+        values = ExactValues(then, exact)
+        pressed = quantity == "pressure"
+        found = values.pressure(zone) if pressed else values.of_friction(zone, quantity)
+        return found.reshape(len(zone.area), -1)
+    centres, given = _at_macro(zone, points), reference
+    return np.stack(
+        [evaluate(one, centres) for one in (given if isinstance(given, tuple) else (given,))],
+        axis=1,
+    )
 
 
 def _at_macro(zone: ZoneResult, points: np.ndarray) -> np.ndarray:

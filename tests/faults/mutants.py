@@ -69,6 +69,7 @@ UNLOADED, PULLED = "friction/unloaded-quad8", "friction/pulled-quad8"
 RIGHT, RECOVERED = "friction-patch/t-slip", "friction/sliding-recovered"
 SPATIAL = "friction-patch/v-slip"
 SLID, RUBBING, TURNED = "motion/slide-c", "motion/slide-c-friction", "motion/rings"
+ALONG = "motion/hertz"
 DISC, RINGS = "axisymmetric/disc-quad4-tria6", "axisymmetric/spheres-quad8"
 
 
@@ -317,6 +318,11 @@ MUTANTS = (
            "simulation.scene.moved:Frames.turned",
            given(lambda frames, vectors, body: (Frames.still(len(frames.turn), len(vectors[0])),
                                                 vectors, body))),
+    Mutant("solution-at-the-end", "the exact solution is that of the last step in each", ALONG,
+           "case.model:Case.exact_in", given(lambda case, step: (case, case.steps[-1]))),
+    Mutant("surface-left", "a rigid surface stays where it is given", ALONG,
+           "mechanics.mortar.quadric:Quadric.moved",
+           given(lambda surface, turn, shift: (surface, turn, 0 * shift))),
     Mutant("work-halved", "friction does half the work, as if it grew with the slip", STEPWISE,
            "simulation.equilibrium.friction:_work", changed(lambda work: work / 2)),
 )  # fmt: skip

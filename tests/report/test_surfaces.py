@@ -191,6 +191,17 @@ def test_all_positions_of_bodies_that_move_far_are_there():
         assert sorted(set(pressure.round(3).tolist())) == [0.0, 25.0]
 
 
+def test_a_surface_without_cells_goes_along(tmp_path):
+    """Each position has it where the step had it: here a parabola, its points on it."""
+    case = load_case(CASES / "motion/hertz.yaml")
+    solution = solved(case, mesh_of(case), LEAN, Clock())
+    _, content = json.loads(surfaces(solution, "c").removeprefix("surfaces(...")[:-3])
+    part = next(part for part in content["parts"] if part["name"] == "cylinder")
+    for step, one in zip(case.steps, part["earlier"], strict=False):
+        x, y, _ = np.frombuffer(base64.b64decode(one["points"]), "<f4").reshape(-1, 3).T
+        np.testing.assert_allclose(y, (x - step["go"]) ** 2 / 1000, atol=1e-6)
+
+
 @pytest.mark.skipif(bool(MISSING), reason=MISSING)
 def test_the_slider_goes_to_a_step(tmp_path):
     case = load_case(CASES / "motion/slide-c.yaml")

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from solver.case.reader import load_case
 from solver.simulation.scene.moved import Frames, _best_turn, rotation_by, rotation_vector
 from solver.system.errors import InputError
-from tests.simulation.test_motion import TEXT, moving
+from tests.simulation.test_motion import CASES, TEXT, moving
 
 angles = st.floats(-3.0, 3.0)
 
@@ -80,7 +81,37 @@ def test_what_does_not_go_with_motion_is_refused_by_both_keys(changes, key):
     assert error.value.key == key
 
 
-def test_an_exact_solution_does_not_go_with_motion():
-    reference = {"kind": "analytical", "solution": "layers", "contact_pressure": "solution"}
-    with pytest.raises(InputError, match=r"reference\.solution"):
-        moving(reference=reference, steps=[1.0])
+HERTZ = {"name": "hertz_half_planes", "end": 3.3, "radius": 500, "bottom": "all", "top": "rigid"}
+CYLINDER = {"parabola": {"point": [0, 0], "normal": [0, -1], "radius": 500}}
+
+
+@pytest.mark.parametrize(
+    ("solution", "bodies"),
+    [
+        ("layers", {"cylinder": CYLINDER | {"move": {"x": 1}, "name": "go"}}),
+        (HERTZ, {}),
+        (HERTZ, {"cylinder": CYLINDER | {"move": {"x": 1}}}),
+        (HERTZ, {"cylinder": CYLINDER | {"move": {"x": 1, "rz": 1}, "name": "go"}}),
+        (HERTZ, {n: CYLINDER | {"move": {"x": 1}, "name": "go"} for n in ("one", "two")}),
+    ],
+)
+def test_an_exact_solution_goes_along_with_one_named_body_alone(solution, bodies):
+    zones = [
+        {"name": name, "slave": "top_contact", "master": name} for name in bodies or ["bottom"]
+    ]
+    reference = {"kind": "analytical", "solution": solution, "contact_pressure": "solution"}
+    with pytest.raises(InputError, match="`motion: large`") as error:
+        moving(
+            reference=reference,
+            steps=[{"go": 1.0, "press": 1.0, "pull": 0.0}],
+            bodies=bodies,
+            contact=zones,
+        )
+    assert error.value.key == "reference.solution"
+
+
+def test_an_exact_solution_is_where_each_step_has_its_body():
+    case = load_case(CASES / "motion/hertz.yaml")
+    places = [case.exact_in(step).origin for step in case.steps]
+    np.testing.assert_allclose(places, 0.05 + 1.3 * np.arange(10), rtol=1e-14)
+    assert case.solution.origin == places[-1]

@@ -7,7 +7,7 @@ formula holds a little beyond its part, so that it can be evaluated on a mesh th
 exact geometry.
 """
 
-from dataclasses import field, fields
+from dataclasses import field, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -99,6 +99,12 @@ class ExactSolution:
     def slip(self, x: np.ndarray) -> np.ndarray:
         """Slip (n, dim) of the second part relative to the first in the last step."""
         raise self._missing("slip")
+
+    def moved(self, way: float) -> "ExactSolution | None":
+        """The same contact further along x; None where it belongs to one place."""
+        if "origin" not in {one.name for one in fields(self)}:  # type: ignore[arg-type]
+            return None
+        return replace(self, origin=self.origin + way)  # type: ignore[type-var, attr-defined]
 
     @property
     def states(self) -> "tuple[ExactSolution, ...]":

@@ -1,8 +1,8 @@
-"""Contacts of half-planes that are symmetric about x = 0: waves, Hertz's, a punch, a wedge.
+"""Contacts of half-planes that are symmetric about x = origin: waves, Hertz's, a punch, a wedge.
 
 The upper body fills y > 0, the lower one mirrors it. There is no friction. With z = x + i|y|,
 Westergaard's function Z, its integral Ẑ and derivative Z′, in plane strain and with v pointing away
-from the interface,
+from the interface, x from the origin,
 
     σ_x = Re Z − |y| Im Z′,    σ_y = Re Z + |y| Im Z′,    τ = −|y| Re Z′
     2 μ u = (1 − 2ν) Re Ẑ − |y| Im Z,    2 μ v = 2 (1 − ν) Im Ẑ − |y| Re Z
@@ -54,16 +54,21 @@ class HalfPlanes(ElasticSolution):
 
     bottom: Material = parameter("of the lower body", source="material")
     top: Material = parameter("of the upper body", source="material")
+    origin: float = parameter("x of the middle, from which the others are counted", default=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        finite = {name: isfinite(getattr(self, name).young) for name in self.parts}
-        self.require("must not be rigid", **finite)
+        both_rigid = not any(isfinite(material.young) for material in self.materials)
+        self.require("must not be rigid: the other body is", top=not both_rigid)
 
     @property
     def modulus(self) -> float:
         """E*."""
         return 1 / sum((1 - m.poisson**2) / m.young for m in self.materials)
+
+    def place(self, x: np.ndarray) -> np.ndarray:
+        """Places (n,) along the interface from the origin, of points (n, dim)."""
+        return x[:, 0] - self.origin
 
     def functions(self, z: np.ndarray) -> Functions:
         """Ẑ, Z and Z′ at points of the upper half-plane; Z′ may be infinite on the interface."""
@@ -79,14 +84,16 @@ class HalfPlanes(ElasticSolution):
 
     def contact_pressure(self, x: np.ndarray) -> np.ndarray:
         """−Re Z where the bodies touch."""
-        _, stress, _ = self.functions(x[:, 0] + 0j)
-        return np.where(self.closed(x[:, 0]), np.maximum(-stress.real, 0.0), 0.0)
+        place = self.place(x)
+        _, stress, _ = self.functions(place + 0j)
+        return np.where(self.closed(place), np.maximum(-stress.real, 0.0), 0.0)
 
     def gap(self, x: np.ndarray) -> np.ndarray:
         """g₀ + (2/E*) Im Ẑ where they do not."""
-        opened = 2 / self.modulus * self.functions(x[:, 0] + 0j)[0].imag
-        found = self.initial_gap(x[:, 0]) + opened
-        return np.where(self.closed(x[:, 0]), 0.0, np.maximum(found, 0.0))
+        place = self.place(x)
+        opened = 2 / self.modulus * self.functions(place + 0j)[0].imag
+        found = self.initial_gap(place) + opened
+        return np.where(self.closed(place), 0.0, np.maximum(found, 0.0))
 
     def displacement(self, x: np.ndarray, part: Part = None) -> np.ndarray:
         """Displacement u, v of each body, v with the sign of its side."""
@@ -113,7 +120,7 @@ class HalfPlanes(ElasticSolution):
         upper = self.part_of(x, part)
         side = np.where(upper == 1, 1.0, -1.0)
         height = np.maximum(side * x[:, -1], 0.0)
-        whole, stress, slope = self.functions(x[:, 0] + 1j * height)
+        whole, stress, slope = self.functions(self.place(x) + 1j * height)
         rest = np.where(height > 0, height * np.where(height > 0, slope, 0), 0)
         elastic = np.array([(lame_of(m)[1], m.poisson) for m in self.materials]).T
         return side, height, (whole, stress, rest), elastic[:, upper]
@@ -158,6 +165,10 @@ class Pressed(ContactArea, HalfPlanes):
     def closed(self, x: np.ndarray) -> np.ndarray:
         """Within the half-width."""
         return np.abs(x) < self.half_width
+
+    def distance(self, x: np.ndarray) -> np.ndarray:
+        """From the middle."""
+        return np.abs(self.place(x))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,7 +231,7 @@ class PartialWaves(Pressed):
     ) -> dict[str, float]:
         """Those of the half ellipse of p/cos ψ over sin ψ."""
         angle = pi / (2 * self.size)
-        place, at = np.abs(np.sin(angle * x[:, 0])), angle * centre[:, 0]
+        place, at = np.abs(np.sin(angle * self.place(x))), angle * self.place(centre)
         found = half_ellipse(place, force, np.abs(np.sin(at)), mean / np.cos(at), 0.25)
         if found:
             found["half_width"] = float(np.arcsin(found["half_width"]) / angle)
@@ -377,4 +388,4 @@ class Wedge(_Given):
 
     def regular(self, x: np.ndarray) -> np.ndarray:
         """Beyond 0.2 a from the tip, too."""
-        return super().regular(x) & (np.abs(x[:, 0]) >= 0.2 * self.end)
+        return super().regular(x) & (self.distance(x) >= 0.2 * self.end)

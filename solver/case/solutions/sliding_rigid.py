@@ -47,6 +47,7 @@ class _Sliding(ExactSolution):
     force: float = parameter("P per length", positive=True)
     friction: float = parameter("μ", source="friction", positive=True)
     dim: int = parameter("2", source="extruded", default=2)
+    origin: float = parameter("x of the apex, or of the middle of the punch", default=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -66,7 +67,7 @@ class _Sliding(ExactSolution):
     @property
     def middle(self) -> float:
         """Where the middle of the contact is."""
-        return 0.0
+        return self.origin
 
     @property
     def _factor(self) -> float:
@@ -104,7 +105,7 @@ class _Sliding(ExactSolution):
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingCylinder(_Sliding):
-    """A rigid cylinder, its apex at the origin, on the half-plane below; plane strain."""
+    """A rigid cylinder, its apex at x = origin, on the half-plane below; plane strain."""
 
     name: ClassVar[str] = "sliding_cylinder"
     exponent: ClassVar[float] = 0.5
@@ -120,7 +121,7 @@ class SlidingCylinder(_Sliding):
     @property
     def middle(self) -> float:
         """Where the middle of the contact is."""
-        return -2 * self.skew * self.half_width
+        return self.origin - 2 * self.skew * self.half_width
 
     @property
     def _factor(self) -> float:
@@ -130,7 +131,7 @@ class SlidingCylinder(_Sliding):
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingPunch(_Sliding):
-    """A rigid flat punch, its middle at the origin, on the half-plane below; plane strain."""
+    """A rigid flat punch, its middle at x = origin, on the half-plane below; plane strain."""
 
     name: ClassVar[str] = "sliding_punch"
     exponent: ClassVar[float] = -0.5

@@ -46,8 +46,8 @@
         // The positions of all steps; the last one has all fields.
         const pressure = Object.keys(part.fields)[0], { points, displacement, fields } = part;
         part.places = [...(part.earlier ?? []).map((one) => ({
-          points: one.points ? floats(one.points) : points,
-          displacement: one.displacement ? floats(one.displacement) : displacement,
+          points: floats(one.points),
+          displacement: floats(one.displacement),
           fields: one.pressure ? { [pressure]: floats(one.pressure) } : {},
         })), { points, displacement, fields }];
       }

@@ -194,9 +194,13 @@ class Attributes(CutGroups):
             return {name: self._state(solution) for name, solution in states.items()}
         return {name: self._history(name) for name in ("", *self.case.histories)}
 
-    def _state(self, solution: ExactSolution) -> tuple[np.ndarray, np.ndarray]:
+    def with_solution(self, solution: ExactSolution) -> Attributes:
+        """The same with the fields of another exact solution."""
         case = replace(self.case, solution=solution)
-        then = Attributes(case, self.mesh, self.cut, self.zones, self.origin)
+        return Attributes(case, self.mesh, self.cut, self.zones, self.origin)
+
+    def _state(self, solution: ExactSolution) -> tuple[np.ndarray, np.ndarray]:
+        then = self.with_solution(solution)
         return then.forces(), then.supports().offset
 
     def _history(self, name: str) -> tuple[np.ndarray, np.ndarray]:

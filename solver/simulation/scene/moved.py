@@ -314,7 +314,7 @@ def _imposed_frame(
     vector = rotation_vector(last.turn[number])
     keys = [*"xyz"[:dim], "rx", "ry", "rz"]
     now = dict(zip(keys, [*moved, *vector], strict=True))
-    factor = in_step(step, rest.case.histories, lambda n: float(n in (None, body.name)))
+    factor = body.factor(step)
     imposed = {key: factor * body.move.get(key, 0.0) for key in keys if key not in body.force}
     now |= imposed
     turn = rotation_by(np.array([now[key] for key in ("rx", "ry", "rz")]), dim)

@@ -54,6 +54,29 @@ def test_the_gradient_is_that_of_the_displacement(solution, part):
 
 @both
 @each
+def test_a_moved_solution_has_the_same_values_further_along(solution, part):
+    moved, x, further = solution.moved(2.5), inside(part), np.array([2.5, 0.0])
+    for name in ("displacement", "gradient", "stress"):
+        expected = getattr(solution, name)(x, part)
+        found = getattr(moved, name)(x + further, part)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    places = on_interface()
+    for name in ("contact_pressure", "gap", "regular"):
+        expected = getattr(solution, name)(places)
+        found = getattr(moved, name)(places + further)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_one_body_may_be_rigid_and_not_both():
+    rigid = Material(np.inf, 0.0)
+    one = replace(HERTZ, top=rigid)
+    assert one.modulus == pytest.approx(2000 / 0.91)
+    with pytest.raises(ParameterError, match="top"):
+        replace(HERTZ, bottom=rigid, top=rigid)
+
+
+@both
+@each
 def test_the_stress_is_in_equilibrium(solution, part):
     def tensor(y):
         return solution.stress(y, part)[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
@@ -222,7 +245,6 @@ def test_the_half_width_is_found_again(solution):
     ("cls", "wrong", "named"),
     [
         (ContactEdge, {"factor": 0.0}, "factor"),
-        (ContactEdge, {"factor": 1.0, "top": Material(np.inf, 0.0)}, "top"),
         (PartialWaves, {"size": 1.0, "amplitude": 0.01, "mean_pressure": 40.0}, "mean_pressure"),
         (HertzHalfPlanes, {"end": 0.0, "radius": 1.0}, "end"),
         (RoundedPunch, {"end": 1.0, "flat": 1.0, "radius": 1.0}, "flat"),
