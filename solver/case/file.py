@@ -12,7 +12,6 @@ from .acting import (
     Load,
     Name,
     Probe,
-    Rigid,
     Scalar,
     SelectionKeys,
     Support,
@@ -22,6 +21,7 @@ from .acting import (
 )
 from .checks import CHECKS
 from .reference import ReferenceKeys
+from .rigid import Rigid
 from .typed import FieldError, Number, Positive, Section
 
 FORM = "{file: MESH, refine: 2}, or {recipe: NAME, …}"

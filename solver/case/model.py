@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
-from .acting import Load, Probe, Rigid, Step, Support
+from .acting import Load, Probe, Step, Support
 from .file import Observation, Zone
 from .material import Material
+from .rigid import Rigid
 
 if TYPE_CHECKING:
     from .solutions.base import ExactSolution

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..system.errors import InputError, hint
-from .acting import Load, Rigid, Scalar, Support
+from .acting import Load, Scalar, Support
 from .checks import BY_NAME, ERRORS
 from .expressions import Expression
 from .file import Zone
 from .model import MARGIN, SWAPPED, Case
+from .rigid import Rigid
 
 Fault = tuple[str, object, str]
 # Keys of the reference that need contact.

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from solver.case.acting import Load, Rigid, Support
+from solver.case.acting import Load, Support
 from solver.case.expressions import Expression
 from solver.case.file import Observation, Zone
 from solver.case.material import Material
 from solver.case.model import Case
 from solver.case.reader import check_mesh_file, load_case, parse_case
+from solver.case.rigid import Rigid
 from solver.case.solutions.polynomial import Hydrostatic
 from solver.system.errors import InputError
 from tests.case.files import FULL, MINIMAL, PATH

@@ -198,7 +198,11 @@ def test_a_surface_without_cells_goes_along(tmp_path):
     _, content = json.loads(surfaces(solution, "c").removeprefix("surfaces(...")[:-3])
     part = next(part for part in content["parts"] if part["name"] == "cylinder")
     for step, one in zip(case.steps, part["earlier"], strict=False):
-        x, y, _ = np.frombuffer(base64.b64decode(one["points"]), "<f4").reshape(-1, 3).T
+        points, moved = (
+            np.frombuffer(base64.b64decode(one[key]), "<f4").reshape(-1, 3)
+            for key in ("points", "displacement")
+        )
+        x, y, _ = (points + moved).T
         np.testing.assert_allclose(y, (x - step["go"]) ** 2 / 1000, atol=1e-6)
 
 

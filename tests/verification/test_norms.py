@@ -8,8 +8,8 @@ import pytest
 
 import solver.lac.threads
 import solver.verification.norms
-from solver.case.acting import Rigid
 from solver.case.material import Material
+from solver.case.rigid import Rigid
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.polynomial import Parabola2d, Paraboloid3d
