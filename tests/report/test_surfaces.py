@@ -203,7 +203,7 @@ def test_a_surface_without_cells_goes_along(tmp_path):
             for key in ("points", "displacement")
         )
         x, y, _ = (points + moved).T
-        np.testing.assert_allclose(y, (x - step["go"]) ** 2 / 1000, atol=1e-6)
+        np.testing.assert_allclose(y, (x - step["go"]) ** 2 / 10000, atol=1e-6)
 
 
 @pytest.mark.skipif(bool(MISSING), reason=MISSING)
