@@ -102,9 +102,8 @@ class ExactSolution:
 
     def moved(self, way: float) -> "ExactSolution | None":
         """The same contact further along x; None where it belongs to one place."""
-        if "origin" not in {one.name for one in fields(self)}:  # type: ignore[arg-type]
-            return None
-        return replace(self, origin=self.origin + way)  # type: ignore[type-var, attr-defined]
+        origin = getattr(self, "origin", None)
+        return None if origin is None else replace(self, origin=origin + way)  # type: ignore[type-var]
 
     @property
     def states(self) -> "tuple[ExactSolution, ...]":

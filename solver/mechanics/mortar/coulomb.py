@@ -27,6 +27,10 @@ from scipy.sparse.linalg import LinearOperator, gmres
 # falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits.
 _MOST, _EXACT, _ENOUGH, _STALLED = 60, 1e-13, 1e-9, 0.3
 _LATE, _ROUNDED = 15, 1e-6
+# Forces below this share of those that close everything are as good as none.
+_OPEN = 1e-6
+# Imposed gaps that would bring up so many times the forces lose digits of these.
+_WIDE = 1e4
 # A coefficient with which all that is closed sticks.
 _ROUGH = 1e6
 UNIQUE = 1.0
@@ -177,11 +181,16 @@ class CoulombContact:
         z[rows] = self._solved(fault, rows, bound * start[of] - start[rows])
         return z
 
-    def _newton(self, z: np.ndarray, start: np.ndarray, searches: bool) -> _Found | None:
-        """The law fulfilled, its z (r,), and the steps from `z` on; `searches`: along each step."""
+    def _newton(
+        self, z: np.ndarray, start: np.ndarray, searches: bool, at: np.ndarray | float = 0.0
+    ) -> _Found | None:
+        """The law fulfilled, its z (r,), and the steps from `z` on; `searches`: along each step.
+
+        The forces `start` (r,) are those at the jumps `at` (r,).
+        """
         best, exact = np.inf, _EXACT if isinstance(self.stiffness, np.ndarray) else _INEXACT
         for count in range(_MOST):
-            law = self._law(z, start + self.stiffness @ z)
+            law = self._law(z, start + self.stiffness @ (z - at))
             fault = float(np.abs(law.fault).max(initial=0.0))
             enough = _ENOUGH if count < _LATE else _ROUNDED
             if fault < exact or (fault < enough and fault > _STALLED * best):
@@ -192,14 +201,41 @@ class CoulombContact:
             z = z + (self._length(z, step, law) if searches else 1.0) * step
         return None
 
-    def corrected(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, float]:
+    def corrected(
+        self, forces: np.ndarray, jump: np.ndarray, start: np.ndarray
+    ) -> tuple[np.ndarray, float]:
         """The jumps (r,) after a Newton step from `forces` and `jump` that need not be those of S.
 
-        Also the fault before it, by the largest force.
+        Also the fault before it, by the largest force; where all is open, what is left of the
+        forces `start` (r,) that would close it is round-off.
         """
-        size = np.abs(forces).max(initial=0.0) or 1.0
+        size = max(np.abs(forces).max(initial=0.0), _OPEN * np.abs(start).max(initial=0.0)) or 1.0
         law = self._law(jump / size, forces / size)
         return jump + size * self._step(law), float(np.abs(law.fault).max(initial=0.0))
+
+    def again(self, forces: np.ndarray, jump: np.ndarray) -> np.ndarray | None:
+        """The jumps (r,) that fulfil the law, from `forces` (r,) at `jump` (r,); None where none.
+
+        Where bodies are far apart, the forces that close all are so large that the law is lost in
+        their rounding: those that act are the measure here.
+        """
+        size = np.abs(forces).max(initial=0.0) or 1.0
+        start, z = forces / size, jump / size
+        found = self._newton(z, start, False, z) or self._newton(z, start, True, z)
+        return None if found is None else found[1] * size
+
+    def opens_wide(self, forces: np.ndarray, jump: np.ndarray) -> bool:
+        """Whether imposed gaps are so wide that their rounding counts beside the forces."""
+        unit = (self.c * np.abs(jump))[: self.m].max(initial=0.0)
+        return bool(unit > _WIDE * np.abs(forces).max(initial=0.0))
+
+    def kept(self, closed: np.ndarray) -> np.ndarray:
+        """The rows (r,) of closed gaps (m,), and of their slips."""
+        rows = np.zeros(len(self.c), dtype=bool)
+        rows[: self.m] = closed
+        for along in self.rows:
+            rows[along] = closed[self.of]
+        return rows
 
     def statuses(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which gaps are closed (m,), and which macro-elements slip (f,).

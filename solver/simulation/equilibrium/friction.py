@@ -55,29 +55,41 @@ class Search:
         # Bodies that went on slip by about as much.
         gone = np.where(base.normal, 0.0, base.initial)[base.eligible] / area
         last = None if self.last is None else area * self.last[base.eligible]
-        solution = contact.solve(area * start.pressure[base.eligible], gone, last)
+        at_rest = area * start.pressure[base.eligible]
+        solution = contact.solve(at_rest, gone, last)
         if solution is None:
             raise SolveError(self._why_none())
-        _, z, steps = solution
-        last = np.inf
-        for _ in range(_CORRECTIONS):
+        forces, z, steps = solution
+        found, fault, last = start, 0.0, np.inf
+        for _ in range(_CORRECTIONS if contact.statuses(forces, z)[0].any() else 0):
             found = self._imposed(z, correction)
             forces = area * found.pressure[base.eligible]
-            following, fault = contact.corrected(forces, z)
+            following, fault = contact.corrected(forces, z, at_rest)
             _LOG.info("friction: %d Newton steps, law off by %.1e", steps, fault)
             if fault < _EXACT or fault > _SLOW * last:
                 break
+            if fault > _TOLERATED and (anew := contact.again(forces, z)) is not None:
+                following = anew
             z, last = following, fault
         if fault > _TOLERATED:
             raise SolveError(self._why_none())
-        return self._with_status(found, *contact.statuses(forces, z))
+        closable, slipping = contact.statuses(forces, z)
+        if contact.opens_wide(forces, z):
+            found = self._imposed(z, correction, contact.kept(closable))
+        return self._with_status(found, closable, slipping)
 
-    def _imposed(self, z: np.ndarray, correction: np.ndarray | float) -> Equilibrium:
-        """Equilibrium with the gaps and slips z (r,) of all that may close or stick."""
-        jump = np.zeros(len(self.jump))
-        jump[self.problem.constraints.eligible] = z
+    def _imposed(
+        self, z: np.ndarray, correction: np.ndarray | float, among: np.ndarray | slice = slice(None)
+    ) -> Equilibrium:
+        """Equilibrium with the gaps and slips z (r,) of all that may close or stick.
+
+        `among` (r,): of these alone.
+        """
+        eligible = np.flatnonzero(self.problem.constraints.eligible)
+        jump, rows = np.zeros(len(self.jump)), np.zeros(len(self.jump), dtype=bool)
+        jump[eligible], rows[eligible[among]] = z, True
         self.count += 1
-        return self.problem.with_jumps(self.step, jump, self.jump, correction)
+        return self.problem.with_jumps(self.step, rows, jump, self.jump, correction)
 
     @cached_property
     def _contact(self) -> CoulombContact:

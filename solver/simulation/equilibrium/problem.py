@@ -189,18 +189,23 @@ class ContactProblem:
         return self._refined(first, _force_scale(first), correction)
 
     def with_jumps(
-        self, step: Step, jump: np.ndarray, before: np.ndarray, correction: np.ndarray | float
+        self,
+        step: Step,
+        rows: np.ndarray,
+        jump: np.ndarray,
+        before: np.ndarray,
+        correction: np.ndarray | float,
     ) -> Equilibrium:
-        """Equilibrium with mean gaps and slips imposed on all that may close.
+        """Equilibrium with mean gaps and slips imposed in some rows (k,).
 
         `jump` (k,): what they have more than `before` (k,).
         """
         base = self.constraints
         imposed = replace(base, initial=base.initial - base.covered * (jump + before))
-        first = self._at_rest(base.eligible, step, correction, imposed)
+        first = self._at_rest(rows, step, correction, imposed)
         found = self._refined(first, _force_scale(first), correction)
         iterate = replace(found.iterate, constraints=base)
-        trial = replace(found.trial, gap=np.where(base.eligible, jump, iterate.gap))
+        trial = replace(found.trial, gap=np.where(rows, jump, iterate.gap - before))
         return replace(found, iterate=iterate, trial=trial)
 
     def corrected(self, state: Equilibrium, correction: np.ndarray) -> Equilibrium:
