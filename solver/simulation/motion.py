@@ -36,6 +36,7 @@ from .results.solution import Line, Position, Solution
 from .scene.attributes import Attributes
 from .scene.bodies import body_names
 from .scene.moved import Frames, Moved, predicted, rotation_vector, settled
+from .scene.records import AtWork
 from .scene.scene import CutModel, Scene, build_model, scene_of
 
 _LOG = logging.getLogger(__name__)
@@ -75,6 +76,8 @@ def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) 
     and its mesh do not fit, SolveError where the first step has no solution.
     """
     model = build_model(case, mesh, options, clock)
+    at_work = AtWork.of(model.groups.forces(), model.groups.supports().offset)
+    model = replace(model, at_work=at_work)
     dim = model.groups.points.shape[1]
     frames, last, rounds = Frames.still(int(model.groups.body.max()) + 1, dim), None, 0
     found, ended = list[Solution](), ""

@@ -17,6 +17,9 @@ from ..system.errors import InputError, hint
 from .coverage import expected_coverage
 from .samples import Reference, Sample, Sampler, by_component
 
+# A largest traction below this share of the load is zero.
+_ROUND_OFF = 1e-5
+
 
 def contact_force(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
     """The force on the surface that the case lists as slave, which may be solved as master."""
@@ -111,7 +114,8 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
         getattr(zone.friction, name) for name in ("friction_traction", "slip", "status")
     )
     bound, far = mu * zone.multiplier, np.linalg.norm(slip, axis=1)
-    largest, farthest = float(bound.max()) or 1.0, float(far.max()) or 1.0
+    least = _ROUND_OFF * solution.scalars.load_scale
+    largest, farthest = max(float(bound.max()), least) or 1.0, float(far.max()) or 1.0
     size = np.linalg.norm(traction, axis=1)
     apart = traction * far[:, None] - bound[:, None] * slip
     work = np.array([step.dissipation for step in solution.steps])

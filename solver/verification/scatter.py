@@ -44,7 +44,7 @@ _SAME_SIDE = np.cos(np.radians(30))
 _RANK, _CENTRED = 0.03, 0.3
 # Neighbours in a line have no part across it, up to rounding.
 _IN_LINE = 1e-9
-# Pressures below this share of the stress that the displacement could cause are rounding.
+# Pressures below this share of the stress that loads or the displacement could cause are rounding.
 _ROUNDING = 1e-13
 # A macro-element that is covered by less than this has a mean of another place.
 _COVERED = 0.99
@@ -57,7 +57,8 @@ def unresolved(solution: Solution) -> str:
     """
     case, moved = solution.case, solution.displacement
     limit = allowed_of_pressure(case, LIMIT)
-    rounding = _ROUNDING * stress_of_motion(case, solution.scalars.length, moved)
+    caused = stress_of_motion(case, solution.scalars.length, moved)
+    rounding = _ROUNDING * max(caused, solution.scalars.load_scale)
     for given, zone in zip(case.zones, solution.zones, strict=True):
         peak = zone.multiplier[zone.closed].max(initial=0.0)
         if zone.nodal is not None or not peak > rounding:

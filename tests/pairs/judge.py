@@ -20,6 +20,7 @@ from tests.same import read_back
 
 from .options import Row
 from .problem import Problem, problem_of
+from .state import GAP
 
 # Exact is this; or this, where so many times the solve's own estimate of rounding explains it.
 EXACT, ROUNDING, _MARGIN = 1e-11, 1e-9, 10.0
@@ -99,7 +100,7 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
             continue
         mine = solution.fields.body == number
         places = (given[mine, :dim] - placed.origin) @ placed.turn / placed.scale
-        local = places @ body.gradient.T + body.shift
+        local = (places @ body.gradient.T + body.shift) * problem.factor
         wanted[mine] = placed.scale * local @ placed.turn.T
         seen |= mine
         if not body.rigid:
@@ -107,7 +108,7 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
             turn[:dim, :dim] = placed.turn
             stress = np.zeros((3, 3))
             stress[: len(body.stress), : len(body.stress)] = body.stress
-            stress = turn @ stress @ turn.T
+            stress = problem.factor * turn @ stress @ turn.T
             checked = [k for k, (i, j) in enumerate(COMPONENTS) if max(i, j) < len(body.stress)]
             exact = np.array([stress[COMPONENTS[k]] for k in checked])
             error = np.abs(solution.stress[mine][:, checked] - exact).max() / scale
@@ -115,20 +116,25 @@ def errors_of(problem: Problem, solution: Solution) -> dict[str, float]:
     assert seen.any(), f"no body of the case among {solution.bodies}"
     strained = max(float(np.abs(b.stress).max()) / b.young for b in problem.bodies)
     size = max(float(np.abs(wanted).max()), placed.scale * strained)
+    acts = problem.factor > 0
     found["displacement"] = float(np.abs(moved - wanted)[seen].max() / size)
     coefficient_of = {zone.name: zone.friction for zone in problem.case.zones}
     for zone in solution.zones:
         body = problem.bodies[0 if zone.name == "one" else -1]
         stress = placed.turn @ body.stress[:dim, :dim] @ placed.turn.T
         normal = zone.normal[:, :dim]
-        traction = normal @ stress
+        opened = problem.open and zone.name == "one"
+        traction = normal @ stress * (acts and not opened)
         pressed = np.einsum("md,md->m", traction, normal)
         found[f"pressure of {zone.name}"] = float(np.abs(zone.multiplier + pressed).max() / scale)
-        found[f"gap of {zone.name}"] = float(np.abs(zone.gap).max() / placed.scale)
+        gap = zone.gap - GAP * placed.scale * opened
+        found[f"gap of {zone.name}"] = float(np.abs(gap).max() / placed.scale)
         along = traction - pressed[:, None] * normal
         bound = abs(coefficient_of[zone.name] * pressed)
         slips = (bound > 0) & (np.linalg.norm(along, axis=1) > _NEARLY * bound)
-        found[f"status of {zone.name}"] = float(np.abs(zone.shown_status - 1 - slips).max())
+        status = np.zeros(len(slips)) if opened else 1 + slips
+        if acts:  # surfaces that touch are either
+            found[f"status of {zone.name}"] = float(np.abs(zone.shown_status - status).max())
         if zone.friction is not None:
             error = np.abs(zone.friction.friction_traction[:, :dim] - along).max() / scale
             found[f"friction of {zone.name}"] = float(error)

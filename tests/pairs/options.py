@@ -29,13 +29,16 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "friction": ("none", "held", "stick", "slip", "slip back"),
     "recovery": ("none", "linear", "quadratic", "smooth", "automatic"),
     "stabilised": ("no", "yes"),
-    "gap": ("none", "meshed", "interference", "clearance", "clearance 0", "clearance, overlap"),
+    "gap": (
+        *("none", "meshed", "open", "interference"),
+        *("clearance", "clearance 0", "clearance, overlap"),
+    ),
     "master": ("meshed", "rigid", "rigid, by force", "plane"),
     "master size": ("coarser", "as fine", "finer"),
     "supports": ("imposed", "normal", "springs", "together", "cyclic"),
     "load": ("pressure", "traction", "force"),
     "also": ("nothing", "body force", "strain", "temperature"),
-    "steps": ("one", "factors", "path"),
+    "steps": ("one", "factors", "path", "unloaded"),
     "motion": ("small", "large"),
     "materials": ("equal", "stiff master", "nearly incompressible", "mixed form"),
     "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
@@ -121,7 +124,11 @@ REFUSED = (
             ("supports", ("cyclic",), "a side that moves as another does"),
             ("also", ("strain",), "its components would have to turn"),
             ("also", ("temperature",), "its components would have to turn"),
-            ("gap", _not("gap", "none", "meshed", "interference"), "motion finds the gap itself"),
+            (
+                "gap",
+                ("clearance", "clearance 0", "clearance, overlap"),
+                "motion finds the gap itself",
+            ),
         )
     ),
     *_of_slave(
@@ -158,6 +165,16 @@ REFUSED = (
     ),
 )
 EXCLUDED = (
+    Rule(
+        {"gap": ("open",), "supports": _not("supports", "imposed", "springs")},
+        "nothing holds the body once it is open",
+    ),
+    Rule({"gap": ("open",), "master": ("rigid, by force",)}, "nothing bears the force"),
+    Rule(
+        {"steps": ("unloaded",), "gap": _not("gap", "none", "clearance 0")}, "a gap has no factor"
+    ),
+    Rule({"steps": ("unloaded",), "friction": ("slip",)}, "what slipped does not come back"),
+    Rule({"gap": ("open",), "friction": ("slip", "slip back")}, "nothing slips"),
     Rule(
         {
             "also": ("strain", "temperature"),
@@ -260,7 +277,7 @@ EXCLUDED = (
         "closes without a uniform state",
     ),
     Rule(
-        {"interface": ("tilted",), "gap": ("meshed", "clearance, overlap")},
+        {"interface": ("tilted",), "gap": ("meshed", "open", "clearance, overlap")},
         "the ends of the surfaces part",
     ),
     Rule(

@@ -21,6 +21,7 @@ from .state import AXES, GAP, MU, STRAIN, Body, Placed
 _LAST = 0.4
 _STEPS: dict[str, dict[str, Any]] = {
     "factors": {"steps": [_LAST / 2, _LAST]},
+    "unloaded": {"steps": [_LAST, 0.0]},
     "path": {"steps": [{"go": _LAST}, {"go": _LAST / 2}, {"go": _LAST}]},
     "slip back": {"steps": [{"press": 1, "shear": -1}, {"press": 1, "shear": 1}]},
 }
@@ -43,6 +44,12 @@ class Problem:
     bodies: list[Body]
     placed: Placed
     text: dict[str, Any]
+    open: bool
+
+    @property
+    def factor(self) -> float:
+        """What is left of the state in the last step."""
+        return 0.0 if self.case.steps[-1] == 0 else 1.0
 
 
 def problem_of(row: Row) -> Problem:
@@ -74,7 +81,7 @@ class _Builder(Places):
         case, mesh = case.as_solved(swapped=self.row["form"] == "exchanged"), self.mesh()
         if case.transform:
             mesh = transform(mesh, case.transform, "pairs")
-        return Problem(case, mesh, self.bodies, self.placed, text)
+        return Problem(case, mesh, self.bodies, self.placed, text, self.open)
 
     def _zone(self) -> dict[str, Any]:
         row = self.row
@@ -156,7 +163,17 @@ class _Builder(Places):
         last = self.bodies[-1]
         if not last.rigid and last.name != "lower":
             self._far_end(last)
+        if self.open:
+            self._press(self.bodies[0], "lower-top", 1.0)
+            for body in self.bodies[1:2]:
+                self._press(body, "upper-under", -1.0)
         self._also()
+
+    def _press(self, body: Body, group: str, side: float) -> None:
+        """What contact would do to a flat face of a body."""
+        if not body.rigid:
+            traction = side * body.stress[: self.dim, : self.dim] @ self._up()
+            self._load(group, "traction", self.placed.vector(traction))
 
     def _impose(self, group: str, body: Body, axes: Iterable[int]) -> None:
         """Displacements of the state; in a path of shear, those along it have its factor."""

@@ -129,8 +129,13 @@ class States:
     @property
     def apart(self) -> np.ndarray:
         """How far the upper bodies are meshed from where they touch."""
-        far = {"meshed": GAP, "clearance, overlap": -OVERLAP}.get(self.row["gap"], 0.0)
-        return far * self.normal
+        far = {"meshed": GAP, "open": 2 * GAP, "clearance, overlap": -OVERLAP}
+        return far.get(self.row["gap"], 0.0) * self.normal
+
+    @property
+    def open(self) -> bool:
+        """Whether the first zone stays open by `GAP`; loads keep the stress of both bodies."""
+        return self.row["gap"] == "open"
 
     @property
     def moved(self) -> np.ndarray:

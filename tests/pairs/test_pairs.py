@@ -32,6 +32,18 @@ def test_a_fifth_of_the_array(row):
     assert outcome.word == "exact", (outcome.what, outcome.error)
 
 
+OPEN = {"gap": "open", "friction": "held"}
+UNLOADED = {"steps": "unloaded", "friction": "held"}
+
+
+@pytest.mark.parametrize("more", [OPEN, UNLOADED, {**UNLOADED, "motion": "large"}], ids=str)
+@pytest.mark.parametrize("space", ["strain", "axisymmetric", "solid"])
+def test_friction_where_nothing_presses(space, more):
+    """All else plain: with another zone that presses, the fault did not show."""
+    outcome = tried(plain_in(space) | more)
+    assert outcome.word == "exact", (outcome.what, outcome.error)
+
+
 def completed(part):
     """A row with a part that the program should refuse, plain but for it; None where none fits."""
     solid = any(

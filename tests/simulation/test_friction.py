@@ -9,7 +9,7 @@ from solver import solve_case
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation.equilibrium import problem as problems
+from solver.simulation.equilibrium import contact_stiffness
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.options import Options
 from solver.simulation.scene.scene import build_scene
@@ -80,7 +80,7 @@ def test_products_in_place_of_a_matrix_find_the_same_state(monkeypatch):
     case = plate(0.5, 0.05, change=lambda text: text.replace("plane: strain", uneven))
     dense = solved(case)
     assert dense.cost.iterations <= 4
-    monkeypatch.setattr(problems, "_MOST_ROWS", 0)
+    monkeypatch.setattr(contact_stiffness, "_MOST_ROWS", 0)
     product = solved(case)
     np.testing.assert_allclose(product.displacement, dense.displacement, atol=1e-12)
     for name in ("friction_traction", "slip", "status"):
@@ -94,6 +94,27 @@ def test_newton_finds_no_state_where_nothing_balances_the_force():
         np.diag([1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.1]), np.array([0]), np.array([[1]])
     )
     assert contact.solve(np.array([2.0, 5.0])) is None
+
+
+def test_newton_goes_on_from_forces_that_act():
+    """Gaps so wide that closing them takes 1e12 of what acts: the law is lost in their rounding."""
+    stiffness = np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
+    contact = CoulombContact(
+        stiffness, np.diag(stiffness), np.array([0.5]), np.array([0]), np.array([[2]])
+    )
+    # Pressed by 3 on the first gap, pulled by 2 along it; the second one is 1e12 wide.
+    wide = np.array([0.0, 1e12, 0.0])
+    start = np.array([3.0, 0.0, 2.0]) - stiffness @ wide
+    _, jump, _ = contact.solve(start)
+    exact = np.array([3.0, 0.0, 1.5]), wide - [0.0, 0.0, 0.5]
+    assert contact.opens_wide(exact[0], exact[1])
+    assert contact.kept(contact.statuses(*exact)[0]).tolist() == [True, False, True]
+    acting = np.array([3.0, 0.0, 2.0]) + stiffness @ (jump - wide)
+    again = contact.again(acting, jump)
+    np.testing.assert_allclose(again, exact[1], atol=1e-3)  # of 1e12, known to 1e-4
+    following, fault = contact.corrected(np.array([3.0, 0.0, 1.5]), exact[1], start)
+    assert fault < 1e-15
+    np.testing.assert_allclose(following, exact[1])
 
 
 def test_newton_keeps_the_law_in_space():

@@ -12,7 +12,7 @@ from solver.lac.status import StatusResult
 from solver.mechanics.linear.choice import MULTIGRID
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
-from solver.simulation.equilibrium import problem
+from solver.simulation.equilibrium import contact_stiffness, problem
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement.consistency import inconsistency
 from solver.simulation.scene.scene import build_scene
@@ -176,7 +176,7 @@ def test_a_slender_body_in_space_does_not_turn_about_its_own_axis():
 
 def test_a_body_that_its_loads_pull_away_is_not_searched_for_long(monkeypatch):
     """The load on the whole is a pull: no macro-element system of unit gaps is worth forming."""
-    monkeypatch.setattr(problem, "_AT_ONCE", 0)
+    monkeypatch.setattr(contact_stiffness, "_AT_ONCE", 0)
     pull = PRESSED.replace("25.0", "'25.0 - 60*x'")
     with pytest.raises(SolveError, match="nothing keeps top from a free motion"):
         simulate(blocks(pull), block_mesh("QUAD4", "TRIA3", (6, 4)))

@@ -106,7 +106,7 @@ def width_of(distance: np.ndarray, force: np.ndarray, moment: float) -> float:
     """
     whole = force.sum()
     square = force @ distance**2 / whole if whole > 0 else 0.0
-    return float(np.sqrt(square / moment))
+    return float(np.sqrt(max(square, 0.0) / moment))
 
 
 def half_ellipse(

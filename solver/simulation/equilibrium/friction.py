@@ -24,6 +24,13 @@ _LOG = logging.getLogger(__name__)
 # as well where it falls by less than the half. A larger fault than the last one is no state.
 _CORRECTIONS, _EXACT, _SLOW, _TOLERATED = 6, 1e-15, 0.5, 1e-6
 
+# Forces of contact below this share of the loads are none.
+_NOTHING = 1e-12
+_UNHELD = (
+    "once its contact opens or slips: the loads part the bodies or overcome friction, or a support "
+    "is missing"
+)
+
 
 class Search:
     """One step of a problem: the rows of its f macro-elements with friction, and its solves."""
@@ -60,36 +67,71 @@ class Search:
         if solution is None:
             raise SolveError(self._why_none())
         forces, z, steps = solution
-        found, fault, last = start, 0.0, np.inf
-        for _ in range(_CORRECTIONS if contact.statuses(forces, z)[0].any() else 0):
+        _LOG.info("friction: %d Newton steps", steps)
+        nothing = not contact.statuses(forces, z)[0].any()
+        found = self._freed(forces, z, correction) if nothing else None
+        if found is None:
+            found, forces, z = self._corrected(z, at_rest, correction)
+            found = self._freed(forces, z, correction) or found
+        self._refuse_unheld(forces)
+        return self._with_status(found, *contact.statuses(forces, z))
+
+    def _refuse_unheld(self, forces: np.ndarray) -> None:
+        """Raise SolveError where friction alone would hold a body, and nothing presses."""
+        acting = self.problem.scene.loads.at_work.force
+        gaps = forces[: self._contact.m]
+        if gaps.max(initial=0.0) <= _NOTHING * acting and (
+            moves := self.problem.free_motion(self.problem.constraints.closable)
+        ):
+            raise SolveError(f"{moves} {_UNHELD}")
+
+    def _corrected(
+        self, z: np.ndarray, at_rest: np.ndarray, correction: np.ndarray | float
+    ) -> tuple[Equilibrium, np.ndarray, np.ndarray]:
+        """Equilibrium with jumps from z (r,) on that fulfil the law, its forces (r,) and z (r,)."""
+        base, last = self.problem.constraints, np.inf
+        for _ in range(_CORRECTIONS):
             found = self._imposed(z, correction)
-            forces = area * found.pressure[base.eligible]
-            following, fault = contact.corrected(forces, z, at_rest)
-            _LOG.info("friction: %d Newton steps, law off by %.1e", steps, fault)
+            forces = (base.covered * found.pressure)[base.eligible]
+            following, fault = self._contact.corrected(forces, z, at_rest)
+            _LOG.info("friction: law off by %.1e", fault)
             if fault < _EXACT or fault > _SLOW * last:
                 break
-            if fault > _TOLERATED and (anew := contact.again(forces, z)) is not None:
+            if fault > _TOLERATED and (anew := self._contact.again(forces, z)) is not None:
                 following = anew
             z, last = following, fault
         if fault > _TOLERATED:
             raise SolveError(self._why_none())
-        closable, slipping = contact.statuses(forces, z)
-        if contact.opens_wide(forces, z):
-            found = self._imposed(z, correction, contact.kept(closable))
-        return self._with_status(found, closable, slipping)
+        return found, forces, z
+
+    def _freed(
+        self, forces: np.ndarray, z: np.ndarray, correction: np.ndarray | float
+    ) -> Equilibrium | None:
+        """The same with open gaps left free, where they are so wide that their rounding counts.
+
+        None where they are not, or where a body would move freely.
+        """
+        if not self._contact.opens_wide(forces, z):
+            return None
+        rows = self._of_all(self._contact.kept(self._contact.statuses(forces, z)[0]))
+        return None if self.problem.free_motion(rows) else self._imposed(z, correction, rows)
 
     def _imposed(
-        self, z: np.ndarray, correction: np.ndarray | float, among: np.ndarray | slice = slice(None)
+        self, z: np.ndarray, correction: np.ndarray | float, rows: np.ndarray | None = None
     ) -> Equilibrium:
         """Equilibrium with the gaps and slips z (r,) of all that may close or stick.
 
-        `among` (r,): of these alone.
+        `rows` (k,): of these alone.
         """
-        eligible = np.flatnonzero(self.problem.constraints.eligible)
-        jump, rows = np.zeros(len(self.jump)), np.zeros(len(self.jump), dtype=bool)
-        jump[eligible], rows[eligible[among]] = z, True
         self.count += 1
-        return self.problem.with_jumps(self.step, rows, jump, self.jump, correction)
+        rows = self.problem.constraints.eligible if rows is None else rows
+        return self.problem.with_jumps(self.step, rows, self._of_all(z), self.jump, correction)
+
+    def _of_all(self, values: np.ndarray) -> np.ndarray:
+        """Values (r,) of what may close or stick, among those of all rows (k,)."""
+        found = np.zeros(len(self.jump), dtype=values.dtype)
+        found[self.problem.constraints.eligible] = values
+        return found
 
     @cached_property
     def _contact(self) -> CoulombContact:
@@ -104,9 +146,7 @@ class Search:
         """Why Newton's method found no state: a body that friction would have to hold, if any."""
         nothing = np.zeros(len(self.jump), dtype=bool)
         if moves := self.problem.free_motion(nothing):
-            words = "the loads part the bodies or overcome friction, or a support is missing"
-            words += "; smaller steps may find one (substeps)"
-            return f"{moves} once its contact opens or slips: {words}"
+            return f"{moves} {_UNHELD}; smaller steps may find one (substeps)"
         return "no frictional equilibrium found"
 
     def _with_status(

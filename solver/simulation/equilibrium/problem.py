@@ -28,6 +28,7 @@ from .constraints import (
     moved,
     refuse_unsolvable,
 )
+from .contact_stiffness import contact_stiffness, stiffness_of
 from .iterate import ContactIterate
 from .stabilised import compliance_of
 from .state import Equilibrium, estimate, judged, roughness, rounding
@@ -53,11 +54,6 @@ _LARGE = 100_000
 # While the contact status is sought by an iterative solver: residuals of the first solve and of
 # changes, and the share of pressures and motions below which such a solve decides nothing.
 _ROUGH_STATUS, _ROUGH_CHANGE, _UNDECIDED = 1e-5, 1e-3, 1e-3
-# More rows than these make the matrix of the contact alone too large, or, where each column takes
-# iterations, too long to make: 867 rows of 60,000 unknowns take 65 s, products alone 22 s.
-_MOST_ROWS, _MOST_ITERATIVE = 4000, 400
-# Entries of the solutions that are kept at once for the stiffness that gaps see.
-_AT_ONCE = 1 << 23
 
 
 class ContactProblem:
@@ -351,48 +347,14 @@ class ContactProblem:
         largest = np.abs(loads).max(initial=0.0)
         if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
             raise SolveError("no contact pressure balances the loads")
-        return self.stiffness_of(eligible)
+        return stiffness_of(self._systems, self.matrix, self.constraints, eligible)
 
     def contact_stiffness(self) -> tuple[np.ndarray | LinearOperator, np.ndarray]:
-        """`stiffness_of` all that may close or stick (e, e), and about its diagonal (e,).
-
-        Made once, for all steps. For a large contact it is a product, by one solution each.
-        """
+        """See `contact_stiffness`; made once, for all steps."""
         if self._contact_stiffness is None:
-            rows = self.constraints.eligible
-            iterative = self._systems.factored(rows).factor.iterative
-            if rows.sum() <= (_MOST_ITERATIVE if iterative else _MOST_ROWS):
-                found = self.stiffness_of(rows)
-                found = (found + found.T) / 2
-                self._contact_stiffness = found, np.diag(found)
-            else:
-                self._contact_stiffness = self._product_of(rows)
+            about = self._systems, self.matrix, self.constraints, self.diagonal
+            self._contact_stiffness = contact_stiffness(*about)
         return self._contact_stiffness
-
-    def _product_of(self, rows: np.ndarray) -> tuple[LinearOperator, np.ndarray]:
-        system, area = self._systems.factored(rows), self.constraints.covered[rows]
-        nothing, size = np.zeros(self.matrix.shape[0]), len(area)
-
-        def product(jump: np.ndarray) -> np.ndarray:
-            change = system.correction(nothing, area * jump.ravel())
-            return area * system.multiplier(-(self.matrix @ change))
-
-        stiff = self.diagonal > 0  # rigid unknowns have none
-        moving = self.constraints.gaps[rows].power(2)[:, stiff]
-        soft = np.asarray(moving @ (1 / self.diagonal[stiff]))
-        diagonal = area**2 / np.where(soft > 0, soft, soft.max(initial=0.0) or 1.0)
-        return LinearOperator((size, size), matvec=product, dtype=float), diagonal
-
-    def stiffness_of(self, rows: np.ndarray) -> np.ndarray:
-        """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed."""
-        system, area = self._systems.factored(rows), self.constraints.covered[rows]
-        found, size = np.zeros((len(area), len(area))), self.matrix.shape[0]
-        for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
-            imposed = np.zeros((len(area), len(some)))
-            imposed[some, np.arange(len(some))] = area[some]
-            change = system.correction(np.zeros((size, len(some))), imposed)
-            found[:, some] = area[:, None] * system.multiplier(-(self.matrix @ change))
-        return found
 
 
 def _force_scale(start: ContactIterate) -> float:

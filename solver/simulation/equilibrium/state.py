@@ -2,7 +2,8 @@
 
 Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
 into a pressure by what it acts on; it is relative to the largest pressure. Where no force acts, so
-that this is rounding itself, it is relative to the stress that strains and motions could cause:
+that this is rounding itself, it is relative to the stress that strains, motions and the loads of
+other steps could cause:
 
     forces       terms of opposite sign cancel where internal forces are summed (stretched cells,
                  nearly incompressible material), and what the solve leaves unbalanced
@@ -46,6 +47,9 @@ LEAST_DIGITS = 4
 # the second share of the displacements they are the difference of, or below so many roundings of
 # the coordinates, are so too; and pressures below so many times their estimated error.
 _NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
+
+# Forces below this share of the loads of all steps are none.
+_AT_REST = 1e-12
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -220,12 +224,12 @@ def estimate(
     forces, unit = rounded.forces, _unit(iterate)
     scale = float(np.abs(pressure).max(initial=0.0))
     moved = iterate.displacement.total.reshape(scene.points.shape)
+    of_others = scene.loads.at_work.force
+    at_rest = float(np.abs(iterate.force).max()) <= _AT_REST * of_others
     if scale == 0:
-        if not scene.loads.force.any():
-            caused = stress_of_motion(
-                scene.case, scene.coordinates.length, moved
-            ) * scene.coordinates.length ** (scene.space - 1)
-            force_scale = max(force_scale, caused)
+        if at_rest:
+            caused = stress_at_rest(scene, moved) * scene.coordinates.length ** (scene.space - 1)
+            force_scale = max(force_scale, caused, of_others)
         return Accuracy({"forces": float(forces.max()) / force_scale})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
     moving = constraints.moving[closed]
@@ -242,14 +246,21 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    if max(errors.values()) >= scale and not scene.loads.force.any():
+    if max(errors.values()) >= scale and at_rest:
         # The pressure is rounding: no force acts. The measure is what strains and motions would be.
         scale = max(
             scale,
             iterate.sizes.highest,
-            stress_of_motion(scene.case, scene.coordinates.length, moved),
+            stress_at_rest(scene, moved),
+            pressure_of_forces(moving, np.full_like(noise, of_others)),
         )
     return Accuracy({name: error / scale for name, error in errors.items()})
+
+
+def stress_at_rest(scene: Scene, displacement: np.ndarray) -> float:
+    """The stress that a displacement, or what supports impose at load factor 1, would cause."""
+    largest = np.array([np.abs(displacement).max(initial=0.0), scene.loads.at_work.motion])
+    return stress_of_motion(scene.case, scene.coordinates.length, largest)
 
 
 def stress_of_motion(case: Case, length: float, displacement: np.ndarray) -> float:

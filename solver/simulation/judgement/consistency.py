@@ -16,7 +16,7 @@ from ..results.solution import Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by its estimated error and by what so many
-# roundings of displacements are as stress.
+# roundings of displacements and loads are as stress.
 _TOLERANCE, _ROUNDINGS = 1e-8, 1e3
 # What is not known everywhere, or not yet, and what is no number.
 _MAY_BE_NAN = {
@@ -75,6 +75,7 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     smallest = float(zone.area.min()) ** (1 / (dim - 1))
     error = round_off * young * float(np.abs(moved).max()) / smallest
     error += max(solution.quality.accuracy.values(), default=0.0) * largest
+    error += round_off * solution.scalars.load_scale
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"

@@ -136,6 +136,8 @@ _SMALL_SLIP = 1.0
 _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
 _NOTED_FACETS, _FACETS, _DEPTH = 1e-2, 0.1, 2.0
+# A largest pressure below this share of that of another step is none.
+_PRESSED = 1e-9
 NOTED_DEPTH = 0.1
 """Deeper facets than this, in elastic closings, are worth a word."""
 # The checks of a pressure along the surface whose tolerance may be wider.
@@ -150,7 +152,7 @@ OF_PRESSURE = (
 
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
-    scene, facets = problem.scene, facets_of(problem, states[-1])
+    scene, facets = problem.scene, facets_of(problem, _last_pressed(states))
     solid, apart, found = meshed(scene), _apart(scene), []
     for state in states:
         moved, closed = state.displacement, state.status.closed
@@ -168,6 +170,12 @@ def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity
         )
         found.append(one)
     return Validity.worst(found)
+
+
+def _last_pressed(states: Sequence[Equilibrium]) -> Equilibrium:
+    """The last state with a pressure that is more than round-off of that of others."""
+    pressed = [float(np.abs(state.pressure).max(initial=0.0)) for state in states]
+    return states[max(i for i, p in enumerate(pressed) if p >= _PRESSED * max(pressed))]
 
 
 def _apart(scene: Scene) -> np.ndarray:

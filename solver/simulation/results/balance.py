@@ -12,7 +12,7 @@ from ...mechanics.fem.supports import DEPENDENT
 from ...mechanics.linear.choice import factorise
 from ...mechanics.mortar.edge import Edges, contact_edges
 from ..equilibrium.recovery import RecoveredZone
-from ..equilibrium.state import Equilibrium, stress_of_motion
+from ..equilibrium.state import Equilibrium, stress_at_rest
 from ..scene.scene import Scene, ZoneScene
 from .forces import Reaction, Resultants, RigidMotion
 
@@ -26,9 +26,10 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     """Relative imbalances by name.
 
     Forces are divided by the sum of the sizes of the nodal forces at work (loads, or contact forces
-    where there is no load, and at least the force that the displacement could cause), moments by
-    that times the length of the model. Of axisymmetric bodies only forces along the axis have a
-    resultant. Friction between surfaces that are meshed apart is a couple, which is no imbalance.
+    where there is no load, and at least the force that the displacement could cause, and the loads
+    of other steps), moments by that times the length of the model. Of axisymmetric bodies only
+    forces along the axis have a resultant. Friction between surfaces that are meshed apart is a
+    couple, which is no imbalance.
     """
     points, around = scene.points, scene.case.axisymmetric
     contact = np.zeros_like(points)
@@ -40,8 +41,9 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
-        stress = stress_of_motion(scene.case, scene.coordinates.length, state.displacement)
-        scale = max(scale, stress * scene.coordinates.length ** (scene.space - 1)) or 1.0
+        stress = stress_at_rest(scene, state.displacement)
+        caused = stress * scene.coordinates.length ** (scene.space - 1)
+        scale = max(scale, caused, scene.loads.at_work.total) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
         by_zone["correction of the pressure"] = state.correction, state.couple

@@ -56,11 +56,33 @@ class Held:
 
 
 @dataclass(frozen=True)
+class AtWork:
+    """How much acts at load factor 1, the scale of a step in which nothing acts.
+
+    The largest nodal `force`, the sum `total` of their sizes, and the largest imposed `motion`.
+    """
+
+    force: float
+    total: float
+    motion: float
+
+    @classmethod
+    def of(cls, force: np.ndarray, offset: np.ndarray) -> "AtWork":
+        """Of nodal forces (n, dim) and imposed displacements (n_dofs,)."""
+        size, moved = np.abs(force), np.abs(offset).max(initial=0.0)
+        return cls(float(size.max()), float(size.sum()), float(moved))
+
+
+@dataclass(frozen=True)
 class Loads:
-    """`force` (n, dim) for load factor 1; by name in steps of names, forces and offsets."""
+    """`force` (n, dim) for load factor 1; by name in steps of names, forces and offsets.
+
+    `at_work`: how much acts in all steps, where `force` may be that of one.
+    """
 
     force: np.ndarray
     histories: dict[str, tuple[np.ndarray, np.ndarray]]
+    at_work: AtWork
 
 
 @dataclass(frozen=True)

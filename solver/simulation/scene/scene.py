@@ -28,7 +28,7 @@ from .groups import ON_AXIS, check_groups, named_parts
 from .operators import operator_of, with_contact_frames
 from .parts import parts_of
 from .parts.part import ModelPart
-from .records import Coordinates, GivenMesh, Held, Loads, Named, Unloaded
+from .records import AtWork, Coordinates, GivenMesh, Held, Loads, Named, Unloaded
 from .selections import with_groups
 
 # An average initial gap below this many roundings of the coordinates is zero.
@@ -167,7 +167,8 @@ class Scene:
 class CutModel:
     """A case on its mesh, cut but not paired: what is the same wherever its bodies are.
 
-    `surfaces`: slave faces as meshed and master faces of each zone; for the rest see `Scene`.
+    `surfaces`: slave faces as meshed and master faces of each zone; `at_work`: of all steps, where
+    the groups will have the loads of one; for the rest see `Scene`.
     """
 
     groups: Attributes
@@ -176,6 +177,7 @@ class CutModel:
     surfaces: Surfaces
     length: float
     rounding: float
+    at_work: AtWork | None = None
 
     @property
     def contact_faces(self) -> list[FaceBlock]:
@@ -258,7 +260,7 @@ def scene_of(model: CutModel, groups: Attributes, clock: Clock) -> Scene:
         parts=parts,
         held=Held(list(groups.fixed().values()), groups.frames()),
         free=free,
-        loads=Loads(force, groups.histories()),
+        loads=Loads(force, groups.histories(), model.at_work or AtWork.of(force, free.offset)),
         named=Named(
             probed={n: groups.nodes(p.group, "probes") for n, p in case.probes.items() if p.group},
             acted={key: groups.nodes(group, key) for key, group in case.acting.items()},
