@@ -9,7 +9,7 @@ from typing import Any
 from ..system.errors import InputError, hint
 from .acting import Load, Scalar, Support
 from .checks import BY_NAME, ERRORS
-from .expressions import Expression
+from .expressions import EXACT, Expression
 from .file import Zone
 from .model import MARGIN, SWAPPED, Case
 from .rigid import Rigid
@@ -157,6 +157,17 @@ def _in_errors(case: Case) -> Iterator[Fault]:
             yield key, value, f"{case.solution.name} has no {BY_NAME[error].needs}"
 
 
+def _in_works(case: Case) -> Iterator[Fault]:
+    """The work of friction is known in each step."""
+    given = case.reference.get("dissipation")
+    exact = given is EXACT and case.solution is not None
+    works = case.solution.dissipation if exact and case.solution else given
+    if isinstance(works, tuple) and len(works) != len(case.steps):
+        allowed = f"must have a number for each of the {len(case.steps)} steps"
+        more = f"; the solution has {len(works)}" if exact else ""
+        yield "reference.dissipation", "solution" if exact else list(works), allowed + more
+
+
 def _in_reference(case: Case) -> Iterator[Fault]:
     """Every value of the reference feeds a check; no tolerance admits any result at all."""
     for check, tolerance in case.tolerance.items():
@@ -171,10 +182,7 @@ def _in_reference(case: Case) -> Iterator[Fault]:
     for key in case.reference.keys() & _OF_FRICTION if not case.frictional else ():
         allowed = "cannot be compared: no contact zone has friction"
         yield f"reference.{key}", None, allowed
-    given = case.reference.get("dissipation")
-    if isinstance(given, tuple) and len(given) != len(case.steps):
-        allowed = f"must have a number for each of the {len(case.steps)} steps"
-        yield "reference.dissipation", list(given), allowed
+    yield from _in_works(case)
     if "coverage" in case.reference and "contact_pressure" not in case.reference:
         allowed = "needs contact_pressure: it says where that acts"
         yield "reference.coverage", None, allowed

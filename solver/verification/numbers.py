@@ -119,12 +119,14 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     size = np.linalg.norm(traction, axis=1)
     apart = traction * far[:, None] - bound[:, None] * slip
     work = np.array([step.dissipation for step in solution.steps])
+    gone = np.linalg.norm(zone.friction.slip_total, axis=1).max(initial=0.0)
+    most = max(float(np.abs(work).sum()), least * float(zone.area.sum() * gone))
     rows = {
         "traction beyond μp of": np.maximum(size - bound, 0.0) / largest,
         "traction without contact on": np.where(status == 0, size, 0.0) / largest,
         "slip without sliding of": np.where(status == 2, 0.0, far) / farthest,
         "traction not along the slip of": np.linalg.norm(apart, axis=1) / (largest * farthest),
-        "negative work of friction in step": np.maximum(-work, 0.0) / (np.abs(work).sum() or 1.0),
+        "negative work of friction in step": np.maximum(-work, 0.0) / (most or 1.0),
     }
     places = [f"{what} {i}" for what, values in rows.items() for i in range(len(values))]
     values = np.concatenate(list(rows.values()))

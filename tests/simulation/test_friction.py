@@ -319,6 +319,13 @@ def test_what_friction_does_not_do_is_refused_by_name(change, key, why):
     assert why in str(refused.value)
 
 
+def test_an_exact_work_needs_the_steps_that_it_is_of():
+    case = CASES / "friction" / "sphere-hexa27.yaml"
+    with pytest.raises(InputError, match=r"each of the 2 steps; the solution has 1") as refused:
+        parse_case(case.read_text() + "\nsteps: [0.5, 1]\n", case)
+    assert refused.value.key == "reference.dissipation"
+
+
 def test_contact_between_bodies_that_are_held_whole_is_refused():
     with pytest.raises(InputError, match=r"supports: .* have no free unknown of their own"):
         solved(plate(0.3, change=lambda text: text.replace("group: base,", "group: all,")))

@@ -1,4 +1,4 @@
-"""What contact alone sees of a whole system with all closed: a stiffness matrix, or its products."""
+"""What contact alone sees of a system with all closed: a stiffness matrix, or its products."""
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator

@@ -224,12 +224,11 @@ def estimate(
     forces, unit = rounded.forces, _unit(iterate)
     scale = float(np.abs(pressure).max(initial=0.0))
     moved = iterate.displacement.total.reshape(scene.points.shape)
-    of_others = scene.loads.at_work.force
-    at_rest = float(np.abs(iterate.force).max()) <= _AT_REST * of_others
+    caused, of_others = stress_at_rest(scene, moved), scene.loads.at_work.force
+    in_all = max(of_others, caused * scene.coordinates.length ** (scene.space - 1))
+    at_rest = float(np.abs(iterate.force).max()) <= _AT_REST * in_all
     if scale == 0:
-        if at_rest:
-            caused = stress_at_rest(scene, moved) * scene.coordinates.length ** (scene.space - 1)
-            force_scale = max(force_scale, caused, of_others)
+        force_scale = max(force_scale, in_all * at_rest)
         return Accuracy({"forces": float(forces.max()) / force_scale})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
     moving = constraints.moving[closed]
@@ -251,7 +250,7 @@ def estimate(
         scale = max(
             scale,
             iterate.sizes.highest,
-            stress_at_rest(scene, moved),
+            caused,
             pressure_of_forces(moving, np.full_like(noise, of_others)),
         )
     return Accuracy({name: error / scale for name, error in errors.items()})
