@@ -120,6 +120,7 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     apart = traction * far[:, None] - bound[:, None] * slip
     work = np.array([step.dissipation for step in solution.steps])
     gone = np.linalg.norm(zone.friction.slip_total, axis=1).max(initial=0.0)
+    gone = max(gone, _ROUND_OFF**2 * solution.scalars.length)
     most = max(float(np.abs(work).sum()), least * float(zone.area.sum() * gone))
     rows = {
         "traction beyond μp of": np.maximum(size - bound, 0.0) / largest,

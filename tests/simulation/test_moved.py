@@ -1,15 +1,19 @@
 """Frames of bodies that move far, and what does not go with `motion: large`."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from solver.case.reader import load_case
 from solver.simulation.scene.moved import Frames, _best_turn, rotation_by, rotation_vector
 from solver.system.errors import InputError
-from tests.simulation.test_motion import CASES, TEXT, moving
+from solver.verification.judge import judge
+from tests.simulation.test_motion import CASES, TEXT, moving, run, whole
 
 angles = st.floats(-3.0, 3.0)
 
@@ -119,3 +123,18 @@ def test_an_exact_solution_is_where_each_step_has_its_body():
     places = [case.exact_in(step).origin for step in case.steps]
     np.testing.assert_allclose(places, 0.05 + 1.3 * np.arange(10), rtol=1e-13)
     assert case.solution.origin == places[-1]
+
+
+@pytest.mark.parametrize("name", ["a", "q"])
+def test_a_block_that_went_down_comes_back_where_its_load_is_taken_away(name):
+    """With friction, on the mesh where it was: what is left of the load is round-off."""
+    case = load_case(CASES / f"ssnp170/{name}.yaml")
+    zones = (structs.replace(case.zones[0], friction=0.3),)
+    changes = {"motion": "large", "steps": (0.5, 1.0, 0.0), "reference": {}, "tolerance": {}}
+    solution = run(replace(case, zones=zones, **changes))
+    assert whole(solution).min() > -1e-12
+    assert np.abs(solution.fields.motion).max() < 1e-13
+    assert solution.zones[0].multiplier.max() < 1e-12
+    assert judge(solution, []).verdict == "solved"
+    pressed = [step.resultants["interface"].pressure[1] for step in solution.steps]
+    assert pressed == pytest.approx([12.5, 25.0, 0.0], abs=1e-10)

@@ -29,6 +29,8 @@ _MOST, _EXACT, _ENOUGH, _STALLED = 60, 1e-13, 1e-9, 0.3
 _LATE, _ROUNDED = 15, 1e-6
 # Forces below this share of those that close everything are as good as none.
 _OPEN = 1e-6
+# Below this share of the forces at work forces are round-off.
+_NOTHING = 1e-12
 # Imposed gaps that would bring up so many times the forces lose digits of these.
 _WIDE = 1e4
 # A coefficient with which all that is closed sticks.
@@ -91,6 +93,7 @@ class CoulombContact:
         forces: np.ndarray,
         guess: np.ndarray | float = 0.0,
         last: np.ndarray | None = None,
+        scale: float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray, int] | None:
         """Forces λ (r,), jumps z (r,) and the iterations, for λ₀ = `forces` (r,); None where none.
 
@@ -98,7 +101,7 @@ class CoulombContact:
         long way; else from where all that is closed sticks; else with a line search; else by way of
         forces between the `last` ones (r,) and λ₀, or of larger coefficients. Where μ is above 1
         there may be several states: then from the first two, and the state in which most of the
-        contact stays closed is taken.
+        contact stays closed is taken. Forces that are round-off of a `scale` are none.
 
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
@@ -110,6 +113,7 @@ class CoulombContact:
         ([2.0, 1.0], [0.5])
         """
         size = np.abs(forces).max(initial=0.0) or 1.0
+        size = scale if size < _NOTHING * scale else size
         start, rest = forces / size, np.zeros(len(forces)) + guess / size
         attempts = self._attempts(rest, start, None if last is None else last / size)
         several = bool(self.friction.max(initial=0.0) > UNIQUE)
@@ -202,14 +206,14 @@ class CoulombContact:
         return None
 
     def corrected(
-        self, forces: np.ndarray, jump: np.ndarray, start: np.ndarray
+        self, forces: np.ndarray, jump: np.ndarray, scale: float = 0.0
     ) -> tuple[np.ndarray, float]:
         """The jumps (r,) after a Newton step from `forces` and `jump` that need not be those of S.
 
-        Also the fault before it, by the largest force; where all is open, what is left of the
-        forces `start` (r,) that would close it is round-off.
+        Also the fault before it, by the largest force; where nothing presses these are round-off of
+        forces of a `scale`.
         """
-        size = max(np.abs(forces).max(initial=0.0), _OPEN * np.abs(start).max(initial=0.0)) or 1.0
+        size = max(np.abs(forces).max(initial=0.0), _OPEN * scale) or 1.0
         law = self._law(jump / size, forces / size)
         return jump + size * self._step(law), float(np.abs(law.fault).max(initial=0.0))
 

@@ -17,7 +17,7 @@ from ...lac.errors import SolveError
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
 from .problem import ContactProblem
-from .state import Equilibrium, Friction
+from .state import Equilibrium, Friction, forces_at_work
 
 _LOG = logging.getLogger(__name__)
 # Corrections of the jumps, and the fault of the law by the largest force that ends them; they end
@@ -63,7 +63,8 @@ class Search:
         gone = np.where(base.normal, 0.0, base.initial)[base.eligible] / area
         last = None if self.last is None else area * self.last[base.eligible]
         at_rest = area * start.pressure[base.eligible]
-        solution = contact.solve(at_rest, gone, last)
+        at_work = forces_at_work(self.problem.scene, start.displacement)
+        solution = contact.solve(at_rest, gone, last, at_work)
         if solution is None:
             raise SolveError(self._why_none())
         forces, z, steps = solution
@@ -71,14 +72,15 @@ class Search:
         nothing = not contact.statuses(forces, z)[0].any()
         found = self._freed(forces, z, correction) if nothing else None
         if found is None:
-            found, forces, z = self._corrected(z, at_rest, correction)
+            scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
+            found, forces, z = self._corrected(z, scale, correction)
             found = self._freed(forces, z, correction) or found
-        self._refuse_unheld(forces)
+        self._refuse_unheld(forces, found)
         return self._with_status(found, *contact.statuses(forces, z))
 
-    def _refuse_unheld(self, forces: np.ndarray) -> None:
+    def _refuse_unheld(self, forces: np.ndarray, found: Equilibrium) -> None:
         """Raise SolveError where friction alone would hold a body, and nothing presses."""
-        acting = self.problem.scene.loads.at_work.force
+        acting = forces_at_work(self.problem.scene, found.displacement)
         gaps = forces[: self._contact.m]
         if gaps.max(initial=0.0) <= _NOTHING * acting and (
             moves := self.problem.free_motion(self.problem.constraints.closable)
@@ -86,14 +88,17 @@ class Search:
             raise SolveError(f"{moves} {_UNHELD}")
 
     def _corrected(
-        self, z: np.ndarray, at_rest: np.ndarray, correction: np.ndarray | float
+        self, z: np.ndarray, scale: float, correction: np.ndarray | float
     ) -> tuple[Equilibrium, np.ndarray, np.ndarray]:
-        """Equilibrium with jumps from z (r,) on that fulfil the law, its forces (r,) and z (r,)."""
+        """Equilibrium with jumps from z (r,) on that fulfil the law, its forces (r,) and z (r,).
+
+        `scale`: of the forces that would close everything, or that are at work.
+        """
         base, last = self.problem.constraints, np.inf
         for _ in range(_CORRECTIONS):
             found = self._imposed(z, correction)
             forces = (base.covered * found.pressure)[base.eligible]
-            following, fault = self._contact.corrected(forces, z, at_rest)
+            following, fault = self._contact.corrected(forces, z, scale)
             _LOG.info("friction: law off by %.1e", fault)
             if fault < _EXACT or fault > _SLOW * last:
                 break

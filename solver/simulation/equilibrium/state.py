@@ -262,6 +262,12 @@ def stress_at_rest(scene: Scene, displacement: np.ndarray) -> float:
     return stress_of_motion(scene.case, scene.coordinates.length, largest)
 
 
+def forces_at_work(scene: Scene, displacement: np.ndarray) -> float:
+    """The largest nodal force of the loads of all steps, else what motions would cause."""
+    length = scene.coordinates.length ** (scene.space - 1)
+    return scene.loads.at_work.force or stress_at_rest(scene, displacement) * length
+
+
 def stress_of_motion(case: Case, length: float, displacement: np.ndarray) -> float:
     """The stress that a displacement (n, dim) would cause as a strain over the model's length."""
     young = max(material.young for material in case.materials.values())

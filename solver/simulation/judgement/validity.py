@@ -19,11 +19,11 @@ from ...lac.threads import prefetch
 from ...mechanics.fem.stress import largest_strain
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
-from ..equilibrium.state import Equilibrium
+from ..equilibrium.state import Equilibrium, forces_at_work
 from ..results.records import Validity
 from ..results.solution import Line
 from ..scene.scene import Scene, ZoneScene
-from .facet_gaps import facets_of
+from .facet_gaps import FacetEffect, facets_of
 
 # Cells that are looked at together.
 _AT_ONCE = 1 << 14
@@ -136,7 +136,7 @@ _SMALL_SLIP = 1.0
 _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
 _NOTED_FACETS, _FACETS, _DEPTH = 1e-2, 0.1, 2.0
-# A largest pressure below this share of that of another step is none.
+# A largest contact force below this share of the forces at work is none.
 _PRESSED = 1e-9
 NOTED_DEPTH = 0.1
 """Deeper facets than this, in elastic closings, are worth a word."""
@@ -152,7 +152,9 @@ OF_PRESSURE = (
 
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
-    scene, facets = problem.scene, facets_of(problem, _last_pressed(states))
+    scene, facets = problem.scene, FacetEffect(0.0, 0.0)
+    if _presses(problem, states[-1]):
+        facets = facets_of(problem, states[-1])
     solid, apart, found = meshed(scene), _apart(scene), []
     for state in states:
         moved, closed = state.displacement, state.status.closed
@@ -172,10 +174,10 @@ def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity
     return Validity.worst(found)
 
 
-def _last_pressed(states: Sequence[Equilibrium]) -> Equilibrium:
-    """The last state with a pressure that is more than round-off of that of others."""
-    pressed = [float(np.abs(state.pressure).max(initial=0.0)) for state in states]
-    return states[max(i for i, p in enumerate(pressed) if p >= _PRESSED * max(pressed))]
+def _presses(problem: ContactProblem, state: Equilibrium) -> bool:
+    """Whether contact presses by more than round-off of the loads of all steps."""
+    forces = (problem.constraints.covered * state.pressure).max(initial=0.0)
+    return bool(forces > _PRESSED * forces_at_work(problem.scene, state.displacement))
 
 
 def _apart(scene: Scene) -> np.ndarray:
