@@ -4,6 +4,7 @@ Types marked with `read` are read further (see `reader`): a `group` becomes the 
 text in a `value` or an `expression` a function of position, `solution` in a `value` `EXACT`.
 """
 
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, field
@@ -19,6 +20,13 @@ Step = float | dict[str, float]
 def factor_of(name: str, step: Step) -> float:
     """The factor that a step gives a name: of loads, supports and bodies."""
     return step.get(name, 1.0) if isinstance(step, dict) else step
+
+
+def in_step(step: Step, names: Iterable[str], of: Callable[[str | None], Any]) -> Any:
+    """The sum over names of what each has, by the factors of a step; `of(None)` is all of it."""
+    if not isinstance(step, dict):
+        return step * of(None)
+    return sum(factor_of(name, step) * of(name) for name in names)
 
 
 Name = Annotated[

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import meshio
 import numpy as np
 
-from ..case.acting import Load
+from ..case.acting import Load, in_step
 from ..case.model import Case
-from ..simulation.scene.moved import Frames, in_step
+from ..simulation.scene.moved import Frames
 from ..simulation.scene.scene import replace_points
 from ..simulation.scene.selections import with_groups
 from ..system.errors import InputError
@@ -40,12 +40,13 @@ class DeckStep:
 def steps_of(given: Attributes, free: np.ndarray, pressures: list[Load]) -> Iterator[DeckStep]:
     """What acts in each step; `free` (n, dim): not held."""
     case, forces = given.case, cache(given.forces)
+    names = ("", *case.histories)
     offsets = cache(lambda name: given.supports(name).offset)
     for step in case.steps:
-        offset = in_step(step, case.histories, offsets)
+        offset = in_step(step, names, offsets)
         held = np.where(free, np.nan, offset.reshape(free.shape))
         values = [load.factor(step) * float(load.value) for load in pressures]
-        yield DeckStep(held, in_step(step, case.histories, forces), values)
+        yield DeckStep(held, in_step(step, names, forces), values)
 
 
 def at_last_position(

@@ -112,7 +112,7 @@ def test_newton_goes_on_from_forces_that_act():
     acting = np.array([3.0, 0.0, 2.0]) + stiffness @ (jump - wide)
     again = contact.again(acting, jump)
     np.testing.assert_allclose(again, exact[1], atol=1e-3)  # of 1e12, known to 1e-4
-    following, fault = contact.corrected(np.array([3.0, 0.0, 1.5]), exact[1], start)
+    following, fault = contact.corrected(exact[0], exact[1], np.abs(start).max())
     assert fault < 1e-15
     np.testing.assert_allclose(following, exact[1])
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...case.acting import Step
+from ...case.acting import Step, in_step
 from ...lac.cells.faces import FaceBlock
 from ...mechanics.fem.supports import Fixed, FreeMotion
 from ...mechanics.mortar.quadric import Quadric
@@ -174,14 +174,7 @@ class Moved(Attributes):
         return int(self.body[self.nodes(name, f"bodies.{name}")[0]])
 
     def _in_step(self, of: Callable[[str | None], Any]) -> Any:
-        return in_step(self.step, self.rest.case.histories, of)
-
-
-def in_step(step: Step, names: tuple[str, ...], of: Callable[[str | None], Any]) -> Any:
-    """The sum over names of what each has, by the factors of a step."""
-    if not isinstance(step, dict):
-        return step * of(None)
-    return sum(step.get(name, 1.0) * of(name) for name in ("", *names))
+        return in_step(self.step, ("", *self.rest.case.histories), of)
 
 
 def _imposed(rest: Attributes, step: Step) -> list[tuple[Holding, str, Fixed]]:
@@ -195,7 +188,7 @@ def _imposed(rest: Attributes, step: Step) -> list[tuple[Holding, str, Fixed]]:
                 None: fixed.values,
                 **{name: given[key].values for name, given in of.items()},
             }
-            values = in_step(step, rest.case.histories, of_name.__getitem__)
+            values = in_step(step, of, of_name.__getitem__)
             found.append((holding, key, replace(fixed, values=values)))
         before |= whole
     return found

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 from scipy import sparse
 
-from ...case.acting import Step
+from ...case.acting import Step, in_step
 from ...case.file import Zone
 from ...case.model import Case
 from ...lac.cells.faces import FaceBlock
@@ -130,11 +130,13 @@ class Scene:
 
     def given_loads(self, step: Step) -> tuple[np.ndarray, np.ndarray]:
         """The same without the forces of parts."""
-        if not isinstance(step, dict):
-            return step * self.loads.force, step * self.free.offset
-        named = [(step.get(name, 1.0), *loads) for name, loads in self.loads.histories.items()]
-        force = np.sum([f * force for f, force, _ in named], axis=0)
-        return force, np.sum([f * offset for f, _, offset in named], axis=0)
+        whole, by_name = (self.loads.force, self.free.offset), self.loads.histories
+
+        def part(i: int) -> np.ndarray:
+            of = lambda name: whole[i] if name is None else by_name[name][i]  # noqa: E731
+            return np.asarray(in_step(step, by_name, of))
+
+        return part(0), part(1)
 
     @property
     def resisting(self) -> sparse.csr_matrix:
