@@ -70,7 +70,9 @@ def _check(check: Check) -> tuple[str, ...]:
 
 def solutions() -> str:
     """Every exact solution: what it says of itself, what is known, its parameters."""
-    return "\n\n".join(_solution(name, cls) for name, cls in SOLUTIONS.items())
+    # By module: they are registered in the order in which modules happen to be imported.
+    ordered = sorted(SOLUTIONS.items(), key=lambda item: item[1].__module__)
+    return "\n\n".join(_solution(name, cls) for name, cls in ordered)
 
 
 def _solution(name: str, cls: type) -> str:
