@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 from solver.mechanics.linear import systems
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation import motion
 from solver.simulation.judgement import validity
 from solver.simulation.results import results
 from solver.simulation.scene import operators
@@ -119,19 +117,7 @@ def _slips_of_all(true: Any) -> Any:
     return result
 
 
-def _nothing_at_work(true: Any) -> Any:
-    return SimpleNamespace(of=lambda *_: true(0.0, 0.0, 0.0))
-
-
 FAULTS = (
-    Fault(
-        "scale-of-one-step",
-        "a step in which nothing acts has no scale where bodies are followed",
-        {"friction": "held", "steps": "unloaded", "motion": "large"},
-        motion,
-        "AtWork",
-        _nothing_at_work,
-    ),
     Fault(
         "frames-of-nodes",
         "frames of nodes whose directions are normalised one by one",

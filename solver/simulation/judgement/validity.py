@@ -19,7 +19,7 @@ from ...lac.threads import prefetch
 from ...mechanics.fem.stress import largest_strain
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
-from ..equilibrium.state import Equilibrium, forces_at_work
+from ..equilibrium.state import Equilibrium
 from ..results.records import Validity
 from ..results.solution import Line
 from ..scene.scene import Scene, ZoneScene
@@ -136,7 +136,7 @@ _SMALL_SLIP = 1.0
 _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
 _NOTED_FACETS, _FACETS, _DEPTH = 1e-2, 0.1, 2.0
-# A largest contact force below this share of the forces at work is none.
+# Forces below this share of those of all steps are none.
 _PRESSED = 1e-9
 NOTED_DEPTH = 0.1
 """Deeper facets than this, in elastic closings, are worth a word."""
@@ -153,7 +153,7 @@ OF_PRESSURE = (
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
     scene, facets = problem.scene, FacetEffect(0.0, 0.0)
-    if _presses(problem, states[-1]):
+    if not _at_rest(problem, states[-1]):
         facets = facets_of(problem, states[-1])
     solid, apart, found = meshed(scene), _apart(scene), []
     for state in states:
@@ -174,10 +174,11 @@ def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity
     return Validity.worst(found)
 
 
-def _presses(problem: ContactProblem, state: Equilibrium) -> bool:
-    """Whether contact presses by more than round-off of the loads of all steps."""
-    forces = (problem.constraints.covered * state.pressure).max(initial=0.0)
-    return bool(forces > _PRESSED * forces_at_work(problem.scene, state.displacement))
+def _at_rest(problem: ContactProblem, state: Equilibrium) -> bool:
+    """Whether the loads of other steps are taken away, and contact presses by round-off of them."""
+    pressed = (problem.constraints.covered * state.pressure).max(initial=0.0)
+    acting = max(float(np.abs(state.force).max()), pressed)
+    return bool(acting < _PRESSED * problem.scene.loads.at_work.force)
 
 
 def _apart(scene: Scene) -> np.ndarray:
