@@ -236,8 +236,15 @@ def _joined(case: Case, found: Sequence[Solution]) -> Solution:
             accuracy=_largest([one.accuracy for one in quality]),
             validity=Validity.worst([one.validity for one in quality]),
         ),
-        earlier=[Position(one.mesh.points, *grid_fields(one)) for one in found[:-1]],
+        earlier=[_position(one, grid_fields(last)) for one in found[:-1]],
     )
+
+
+def _position(step: Solution, kept: tuple[dict[str, np.ndarray], ...]) -> Position:
+    """Where a step left the bodies: a file has the fields of the last step at all positions."""
+    pairs = zip(grid_fields(step), kept, strict=True)
+    fields = ({k: v for k, v in own.items() if k in last} for own, last in pairs)
+    return Position(step.mesh.points, *fields)
 
 
 def _largest(found: Sequence[dict[str, float]]) -> dict[str, float]:
