@@ -223,7 +223,7 @@ def _turned(scene: Scene, name: str, slips: np.ndarray, groups: Moved, last: _Pl
 def _joined(case: Case, found: Sequence[Solution]) -> Solution:
     """The last solution, with the steps of all, and the positions before it."""
     last = found[-1]
-    quality = [one.quality for one in found]
+    quality, kept = [one.quality for one in found], grid_fields(last)
     return replace(
         last,
         case=case,
@@ -236,7 +236,7 @@ def _joined(case: Case, found: Sequence[Solution]) -> Solution:
             accuracy=_largest([one.accuracy for one in quality]),
             validity=Validity.worst([one.validity for one in quality]),
         ),
-        earlier=[_position(one, grid_fields(last)) for one in found[:-1]],
+        earlier=[_position(one, kept) for one in found[:-1]],
     )
 
 

@@ -119,9 +119,9 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     size = np.linalg.norm(traction, axis=1)
     apart = traction * far[:, None] - bound[:, None] * slip
     work = np.array([step.dissipation for step in solution.steps])
-    gone = np.linalg.norm(zone.friction.slip_total, axis=1).max(initial=0.0)
-    gone = max(gone, _ROUND_OFF**2 * solution.scalars.length)
-    most = max(float(np.abs(work).sum()), least * float(zone.area.sum() * gone))
+    gone = np.linalg.norm(zone.friction.slip_total, axis=1)
+    way = float(gone.max(initial=_ROUND_OFF**2 * solution.scalars.length))
+    most = max(float(np.abs(work).sum()), least * float(zone.area.sum()) * way)
     rows = {
         "traction beyond μp of": np.maximum(size - bound, 0.0) / largest,
         "traction without contact on": np.where(status == 0, size, 0.0) / largest,
@@ -171,11 +171,9 @@ def _there(
         pressed = quantity == "pressure"
         found = values.pressure(zone) if pressed else values.of_friction(zone, quantity)
         return found.reshape(len(zone.area), -1)
-    centres, given = _at_macro(zone, points), reference
-    return np.stack(
-        [evaluate(one, centres) for one in (given if isinstance(given, tuple) else (given,))],
-        axis=1,
-    )
+    centres = _at_macro(zone, points)
+    given = reference if isinstance(reference, tuple) else (reference,)
+    return np.stack([evaluate(one, centres) for one in given], axis=1)
 
 
 def _at_macro(zone: ZoneResult, points: np.ndarray) -> np.ndarray:

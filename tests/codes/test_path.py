@@ -16,7 +16,7 @@ from solver.codes.verdicts import check_foreign
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
 from solver.verification.run import mesh_of
-from tests.simulation.test_motion import TEXT, moving, slope
+from tests.simulation.test_motion import TEXT, moving
 
 needs_ccx = pytest.mark.skipif(not shutil.which(PROGRAM), reason="no CalculiX")
 PULL, ZONE = TEXT["supports"][1], TEXT["contact"][0]
@@ -135,7 +135,7 @@ def test_codes_that_follow_no_motion_are_refused_it(slid):
 @needs_ccx
 def test_calculix_pulls_a_block_up_a_slope(tmp_path):
     """The horizontal force is (tan α + μ)/(1 − μ tan α) of the weight."""
-    case = slope()
+    case = load_case(CASES / "slope.yaml")
     deck = deck_of(case, mesh_of(case), layer=True, follows=True)
     force = run_code(CalculiX(), deck, tmp_path, Limits()).forces["interface"]
     assert force[:2] == pytest.approx([-10000.0 * 0.4 / 0.97, 10000.0], rel=1e-6)

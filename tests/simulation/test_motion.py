@@ -181,28 +181,9 @@ def test_a_rigid_master_moves_by_its_finite_rotation():
     assert rigid.translation == pytest.approx([0.0, -1.01], abs=1e-12)
 
 
-def slope():
-    """A block that is pulled up a slope by 1.8 faces."""
-    alpha, weight, mu = np.arctan(0.1), 10000.0, 0.3
-    end = [20 * np.cos(alpha) - 5 * np.sin(alpha), 20 * np.sin(alpha) + 5 * np.cos(alpha)]
-    return moving(
-        mesh={**MESH, "bottom_size": [60.0, 5.0], "top_size": [20.0, 20.0]},
-        transform={"rotate": float(np.degrees(alpha))},
-        materials={"all": {"young": 2.0e7, "poisson": 0.3}},
-        bodies={"bottom": {"rigid": True}},
-        supports=[
-            {"group": "base", "fix": ["x", "y"]},
-            {"at": end, "fix": {"x": 3 * float(np.cos(alpha))}, "name": "pull"},
-        ],
-        loads=[{"group": "top", "body_force": [0.0, -weight / 400], "name": "press"}],
-        steps=[{"press": 1, "pull": k} for k in (1, 2, 3)],
-        contact=[{**TEXT["contact"][0], "friction": mu}],
-    )
-
-
 def test_a_block_is_pulled_up_a_slope():
     """The horizontal force is (tan α + μ)/(1 − μ tan α) of the weight."""
-    solution = run(slope())
+    solution = run(load_case(CASES / "motion/slope.yaml"))
     for step in solution.steps:
         force = step.resultants["interface"].force
         assert force == pytest.approx([-10000.0 * 0.4 / 0.97, 10000.0], rel=2e-5)

@@ -17,15 +17,12 @@ from ...lac.errors import SolveError
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
 from .problem import ContactProblem
-from .state import Equilibrium, Friction, forces_at_work
+from .state import AT_REST, Equilibrium, Friction, forces_at_work
 
 _LOG = logging.getLogger(__name__)
 # Corrections of the jumps, and the fault of the law by the largest force that ends them; they end
 # as well where it falls by less than the half. A larger fault than the last one is no state.
 _CORRECTIONS, _EXACT, _SLOW, _TOLERATED = 6, 1e-15, 0.5, 1e-6
-
-# Forces of contact below this share of the loads are none.
-_NOTHING = 1e-12
 _UNHELD = (
     "once its contact opens or slips: the loads part the bodies or overcome friction, or a support "
     "is missing"
@@ -75,16 +72,14 @@ class Search:
             scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
             found, forces, z = self._corrected(z, scale, correction)
             found = self._freed(forces, z, correction) or found
-        self._refuse_unheld(forces, found)
+        self._refuse_unheld(forces, at_work)
         return self._with_status(found, *contact.statuses(forces, z))
 
-    def _refuse_unheld(self, forces: np.ndarray, found: Equilibrium) -> None:
+    def _refuse_unheld(self, forces: np.ndarray, at_work: float) -> None:
         """Raise SolveError where friction alone would hold a body, and nothing presses."""
-        acting = forces_at_work(self.problem.scene, found.displacement)
-        gaps = forces[: self._contact.m]
-        if gaps.max(initial=0.0) <= _NOTHING * acting and (
-            moves := self.problem.free_motion(self.problem.constraints.closable)
-        ):
+        if forces[: self._contact.m].max(initial=0.0) > AT_REST * at_work:
+            return
+        if moves := self.problem.free_motion(self.problem.constraints.closable):
             raise SolveError(f"{moves} {_UNHELD}")
 
     def _corrected(

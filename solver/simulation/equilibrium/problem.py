@@ -352,8 +352,9 @@ class ContactProblem:
     def contact_stiffness(self) -> tuple[np.ndarray | LinearOperator, np.ndarray]:
         """See `contact_stiffness`; made once, for all steps."""
         if self._contact_stiffness is None:
-            about = self._systems, self.matrix, self.constraints, self.diagonal
-            self._contact_stiffness = contact_stiffness(*about)
+            self._contact_stiffness = contact_stiffness(
+                self._systems, self.matrix, self.constraints, self.diagonal
+            )
         return self._contact_stiffness
 
 

@@ -48,8 +48,8 @@ LEAST_DIGITS = 4
 # the coordinates, are so too; and pressures below so many times their estimated error.
 _NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
 
-# Forces below this share of the loads of all steps are none.
-_AT_REST = 1e-12
+AT_REST = 1e-12
+"""Forces below this share of the loads of all steps are none."""
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -224,12 +224,8 @@ def estimate(
     forces, unit = rounded.forces, _unit(iterate)
     scale = float(np.abs(pressure).max(initial=0.0))
     moved = iterate.displacement.total.reshape(scene.points.shape)
-    caused, of_others = stress_at_rest(scene, moved), scene.loads.at_work.force
-    in_all = max(of_others, caused * scene.coordinates.length ** (scene.space - 1))
-    at_rest = float(np.abs(iterate.force).max()) <= _AT_REST * in_all
     if scale == 0:
-        force_scale = max(force_scale, in_all * at_rest)
-        return Accuracy({"forces": float(forces.max()) / force_scale})
+        return Accuracy({"forces": float(forces.max()) / max(force_scale, _at_rest(iterate))})
     noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
     moving = constraints.moving[closed]
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
@@ -245,15 +241,20 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    if max(errors.values()) >= scale and at_rest:
+    if max(errors.values()) >= scale and _at_rest(iterate):
         # The pressure is rounding: no force acts. The measure is what strains and motions would be.
-        scale = max(
-            scale,
-            iterate.sizes.highest,
-            caused,
-            pressure_of_forces(moving, np.full_like(noise, of_others)),
-        )
+        of_others = np.full_like(noise, scene.loads.at_work.force)
+        caused = stress_at_rest(scene, moved), pressure_of_forces(moving, of_others)
+        scale = max(scale, iterate.sizes.highest, *caused)
     return Accuracy({name: error / scale for name, error in errors.items()})
+
+
+def _at_rest(iterate: ContactIterate) -> float:
+    """The largest nodal force that loads of other steps or motions cause; 0 where a force acts."""
+    scene = iterate.scene
+    caused = force_at_rest(scene, iterate.displacement.total)
+    in_all = max(scene.loads.at_work.force, caused)
+    return in_all if float(np.abs(iterate.force).max()) <= AT_REST * in_all else 0.0
 
 
 def stress_at_rest(scene: Scene, displacement: np.ndarray) -> float:
@@ -262,10 +263,14 @@ def stress_at_rest(scene: Scene, displacement: np.ndarray) -> float:
     return stress_of_motion(scene.case, scene.coordinates.length, largest)
 
 
+def force_at_rest(scene: Scene, displacement: np.ndarray) -> float:
+    """That stress on the model's whole extent, a force."""
+    return stress_at_rest(scene, displacement) * scene.coordinates.length ** (scene.space - 1)
+
+
 def forces_at_work(scene: Scene, displacement: np.ndarray) -> float:
     """The largest nodal force of the loads of all steps, else what motions would cause."""
-    length = scene.coordinates.length ** (scene.space - 1)
-    return scene.loads.at_work.force or stress_at_rest(scene, displacement) * length
+    return scene.loads.at_work.force or force_at_rest(scene, displacement)
 
 
 def stress_of_motion(case: Case, length: float, displacement: np.ndarray) -> float:

@@ -12,7 +12,7 @@ from ...mechanics.fem.supports import DEPENDENT
 from ...mechanics.linear.choice import factorise
 from ...mechanics.mortar.edge import Edges, contact_edges
 from ..equilibrium.recovery import RecoveredZone
-from ..equilibrium.state import Equilibrium, stress_at_rest
+from ..equilibrium.state import Equilibrium, force_at_rest
 from ..scene.scene import Scene, ZoneScene
 from .forces import Reaction, Resultants, RigidMotion
 
@@ -41,8 +41,7 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         contact += forces
     scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
     if not state.force.any():
-        stress = stress_at_rest(scene, state.displacement)
-        caused = stress * scene.coordinates.length ** (scene.space - 1)
+        caused = force_at_rest(scene, state.displacement)
         scale = max(scale, caused, scene.loads.at_work.total) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():

@@ -133,7 +133,9 @@ class Scene:
         whole, by_name = (self.loads.force, self.free.offset), self.loads.histories
 
         def part(i: int) -> np.ndarray:
-            of = lambda name: whole[i] if name is None else by_name[name][i]  # noqa: E731
+            def of(name: str | None) -> np.ndarray:
+                return whole[i] if name is None else by_name[name][i]
+
             return np.asarray(in_step(step, by_name, of))
 
         return part(0), part(1)
