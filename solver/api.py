@@ -91,7 +91,7 @@ def solve_case(
             check_memory(len(made.points), made.points.shape[1], given.path)
         solution = simulate(given, made, options)
         checks = checked(solution, accepted)
-    file = given.mesh.get("path") if mesh is None else mesh
+    file = given.mesh.source.get("path") if mesh is None else mesh
     provenance = gather(given.path, None if isinstance(file, meshio.Mesh | None) else Path(file))
     return Solved(solution, checks, provenance)
 

@@ -56,7 +56,7 @@ contact: [{{name: interface, slave: top, master: punch, {zone}}}]
 
 def changed_case(dim: int, *changes: tuple[str, str], normal: bool = False, **options) -> Case:
     """`block_case` with parts of its text replaced; `normal`: its supports hold along normals."""
-    text = block_case(dim, **options).source
+    text = block_case(dim, **options).about.source
     if normal:
         changes += tuple((f"fix: [{axis}]", "fix: [normal]") for axis in "xyz"[:dim])
     return parse_case(replaced(text, *changes), Path("patch.yaml"))

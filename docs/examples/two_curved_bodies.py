@@ -113,7 +113,7 @@ def main(folder: Path, fine: float = 0.15) -> None:
     print(solved)
 
     seat = solved.zones["seat"]
-    hertz = solved.solution.case.solution
+    hertz = solved.solution.case.reference.exact
     force = 4 * seat.multiplier @ (seat.area * seat.coverage * seat.normal[:, 2])
     print(f"force {force:.1f} N of {FORCE:.1f} N")
     print(f"{seat.closed.sum()} of {len(seat.closed)} macro-elements in contact")

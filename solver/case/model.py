@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec import structs
 
@@ -22,13 +22,6 @@ STATE = "state "
 MARGIN = 1.5
 
 
-def job_name(
-    name: str, swapped: bool, hexahedra: str | None = None, recovery: str | None = None
-) -> str:
-    """The name of one solve of a case: direction and variant, where they are not the case's own."""
-    return "-".join(filter(None, [name, "swapped" * swapped, hexahedra, recovery]))
-
-
 @dataclass(frozen=True)
 class Selection:
     """A group that the case makes on the mesh, under `key` of the file.
@@ -45,51 +38,105 @@ class Selection:
     values: tuple[Any, ...] = ()
 
 
+class SolvedAs(NamedTuple):
+    """How a case is solved where that is not as its file says: see `Case.as_solved`."""
+
+    swapped: bool = False
+    hexahedra: str | None = None
+    recovery: str | None = None
+
+    def job(self, name: str) -> str:
+        """The name of this solve of the case of a name.
+
+        >>> SolvedAs(swapped=True, recovery="linear").job("patch")
+        'patch-swapped-linear'
+        """
+        return "-".join(filter(None, [name, "swapped" * self.swapped, *self[1:]]))
+
+
+AS_WRITTEN = SolvedAs()
+
+
+@dataclass(frozen=True)
+class About:
+    """What a case says that no solve of it uses.
+
+    `source` is the file's text. `units` names those of length and stress, for labels. `directions`:
+    whether it is solved once (first), or with slave and master exchanged too (both).
+    """
+
+    path: Path
+    source: str
+    title: str = ""
+    units: dict[str, str] = field(default_factory=dict)
+    directions: str = "first"
+
+
+@dataclass(frozen=True)
+class CaseMesh:
+    """Where the mesh of a case comes from, and what becomes of it.
+
+    `source` is the file's mapping, its key `file` replaced by `path`, relative to the case file.
+    `counts`: the expected cells and contact faces of bodies.
+    """
+
+    source: dict[str, Any]
+    transform: dict[str, Any] | None = None
+    selections: tuple[Selection, ...] = ()
+    counts: dict[str, dict[str, int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CaseReference:
+    """What the result of a case is compared with, and how closely.
+
+    `values` by key of the file; `exact`: the solution that it names. `uncertainty` is relative,
+    `code` has the keys name and version. `tolerance` holds the overrides by check name, under `all`
+    where one number was given; that of a check with an `expected` error follows from it.
+    """
+
+    values: dict[str, Any] = field(default_factory=dict)
+    exact: "ExactSolution | None" = None
+    kind: str | None = None
+    uncertainty: float | None = None
+    code: dict[str, str] | None = None
+    remark: str = ""
+    tolerance: dict[str, float] = field(default_factory=dict)
+    expected: dict[str, float] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Case:
     """A case: one file, ready to be solved once its mesh is there.
 
-    `materials` in plane stress are those of `Material.in_plane_stress`. `mesh` is the file's
-    mapping, the key `file` replaced by `path`, relative to the case file. `tolerance` holds the
-    overrides by check name, under `all` where one number was given; that of a check with
-    an `expected` error follows from it. `units` names those of length and stress, for labels alone.
-    `source` is the file's text. `family` is the name of the file's folder. `reference_uncertainty`
-    is relative, `reference_code` has the keys name and version.
-    `swapped`, `hexahedra` and `recovery`: how the case is solved, see `as_solved`.
+    `materials` in plane stress are those of `Material.in_plane_stress`.
     """
 
     name: str
-    family: str
-    path: Path
-    title: str
-    source: str
-    mesh: dict[str, Any]
+    about: About
+    mesh: CaseMesh
     materials: dict[str, Material]
     supports: tuple[Support, ...]
     loads: tuple[Load, ...] = ()
     zones: tuple[Zone, ...] = ()
     rigid: dict[str, Rigid] = field(default_factory=dict)
-    transform: dict[str, Any] | None = None
     plane: str | None = None
-    directions: str = "first"
     steps: tuple[Step, ...] = (1.0,)
     motion: str = "small"
     observe: tuple[Observation, ...] = ()
     probes: dict[str, Probe] = field(default_factory=dict)
-    reference: dict[str, Any] = field(default_factory=dict)
-    reference_kind: str | None = None
-    reference_uncertainty: float | None = None
-    reference_code: dict[str, str] | None = None
-    reference_remark: str = ""
-    solution: "ExactSolution | None" = None
-    tolerance: dict[str, float] = field(default_factory=dict)
-    expected: dict[str, float] = field(default_factory=dict)
-    counts: dict[str, dict[str, int]] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    selections: tuple[Selection, ...] = ()
-    swapped: bool = False
-    hexahedra: str | None = None
-    recovery: str | None = None
+    reference: CaseReference = field(default_factory=CaseReference)
+    solved_as: SolvedAs = AS_WRITTEN
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.about.path
+
+    @property
+    def family(self) -> str:
+        """The name of the file's folder."""
+        return self.path.resolve().parent.name or "cases"
 
     @property
     def thin(self) -> bool:
@@ -118,14 +165,9 @@ class Case:
         return any(zone.friction for zone in self.zones)
 
     @property
-    def solved_as(self) -> tuple[bool, str | None, str | None]:
-        """The arguments of `as_solved` that made it."""
-        return self.swapped, self.hexahedra, self.recovery
-
-    @property
     def job(self) -> str:
         """The name of this solve, as of its folder and its file of accepted values."""
-        return job_name(self.name, *self.solved_as)
+        return self.solved_as.job(self.name)
 
     def zone_named(self, name: str) -> Zone:
         """The contact zone of a name."""
@@ -134,23 +176,27 @@ class Case:
     @property
     def states(self) -> "dict[str, ExactSolution]":
         """The states of an exact solution that has one for each step, by the name of the step."""
-        states = self.solution.states if self.solution else ()
+        states = self.reference.exact.states if self.reference.exact else ()
         return dict(zip(self.histories, states, strict=True)) if states else {}
 
     def exact_in(self, step: Step) -> "ExactSolution | None":
         """The exact solution in a step: where bodies move far it goes along with the rigid one.
 
-        `solution` is that of the last step.
+        The one of `reference` is that of the last step.
         """
-        if self.solution is None or not self.moving:
-            return self.solution
-        return self.solution.moved(self._way(step) - self._way(self.steps[-1]))
+        if self.reference.exact is None or not self.moving:
+            return self.reference.exact
+        return self.reference.exact.moved(self._way(step) - self._way(self.steps[-1]))
 
     def at_its_end(self) -> "Case":
         """With the exact solution of the last step in the place of that on the mesh as given."""
-        if self.solution is None or not self.moving:
+        if self.reference.exact is None or not self.moving:
             return self
-        return replace(self, solution=self.solution.moved(self._way(self.steps[-1])))
+        return self.with_exact(self.reference.exact.moved(self._way(self.steps[-1])))
+
+    def with_exact(self, exact: "ExactSolution | None") -> "Case":
+        """The case with another exact solution."""
+        return replace(self, reference=replace(self.reference, exact=exact))
 
     def _way(self, step: Step) -> float:
         """How far along x the rigid body is in a step that the exact solution goes along with."""
@@ -179,8 +225,9 @@ class Case:
         case compares with a tolerance belongs to its own recovery: with another one, errors are
         measured and not judged.
         """
-        other = recovery is not None and any(recovery != zone.recovery for zone in self.zones)
-        found = replace(self, reference={}, tolerance={}, expected={}) if other else self
+        reference = self.reference
+        if recovery is not None and any(recovery != zone.recovery for zone in self.zones):
+            reference = replace(reference, values={}, tolerance={}, expected={})
         zones = tuple(
             structs.replace(
                 zone,
@@ -191,16 +238,18 @@ class Case:
             )
             for zone in self.zones
         )
-        return replace(found, zones=zones, swapped=swapped, hexahedra=hexahedra, recovery=recovery)
+        solved_as = SolvedAs(swapped, hexahedra, recovery)
+        return replace(self, zones=zones, reference=reference, solved_as=solved_as)
 
     def until(self, count: int) -> "Case":
         """The case with its first `count` steps alone, for which it gives no reference."""
         if count == len(self.steps):
             return self
-        return replace(self, steps=self.steps[:count], reference={}, expected={}, solution=None)
+        reference = replace(self.reference, values={}, expected={}, exact=None)
+        return replace(self, steps=self.steps[:count], reference=reference)
 
     def zone_key(self, number: int, side: str) -> str:
         """The key of the file under which the group stands that is solved as slave or master."""
-        if self.swapped:
+        if self.solved_as.swapped:
             side = {"slave": "master", "master": "slave"}[side]
         return f"contact[{number}].{side}"

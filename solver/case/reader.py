@@ -17,7 +17,7 @@ from .acting import Load, Step, Support
 from .expressions import EXACT, Expression
 from .file import MOST_STEPS, CaseFile
 from .material import Material
-from .model import MARGIN, STATE, Case, Selection
+from .model import MARGIN, STATE, About, Case, CaseMesh, CaseReference, Selection
 from .rules import check_rules
 from .typed import Keys, read_as, read_marked
 from .yaml import parse_mapping, read_text
@@ -61,7 +61,7 @@ def parse_case(text: str, path: Path) -> Case:
 
 def check_mesh_file(case: Case) -> None:
     """Raise `InputError` where the case names a mesh file that is not there."""
-    path = case.mesh.get("path")
+    path = case.mesh.source.get("path")
     if path and not path.is_file():
         raise InputError(case.path, "mesh.file", str(path), "no such file")
 
@@ -81,19 +81,22 @@ class _Reader:
             self.materials = {g: self.thin(g, m) for g, m in self.materials.items()}
         self.solution = self.exact_solution()
 
-    def case(self, source: str) -> Case:
-        file, reference = self.file, self.file.reference
-        tolerance, expected = self.tolerances()
-        mesh = dict(file.mesh)
-        if "file" in mesh:
-            mesh["path"] = self.path.parent / mesh.pop("file")
-        return Case(
+    def case(self, text: str) -> Case:
+        file, content = self.file, self.content
+        made = Case(
             name=file.name,
-            family=self.path.resolve().parent.name or "cases",
-            path=self.path,
-            title=file.title,
-            source=source,
-            mesh=mesh,
+            about=About(
+                path=self.path,
+                source=text,
+                title=file.title,
+                units=content.get("units", {}),
+                directions=file.directions,
+            ),
+            mesh=CaseMesh(
+                source=self.mesh_source(),
+                transform=content.get("transform"),
+                counts=content.get("counts", {}),
+            ),
             materials=self.materials,
             supports=self.acting("supports", file.supports),
             loads=self.acting("loads", file.loads),
@@ -101,9 +104,7 @@ class _Reader:
                 read_marked(zone, ("contact", i), self.read) for i, zone in enumerate(file.contact)
             ),
             rigid={g: body for g, body in file.bodies.items() if body.rigid or body.surface},
-            transform=self.content.get("transform"),
             plane=file.plane,
-            directions=file.directions,
             steps=self.steps(),
             motion=file.motion,
             probes={
@@ -111,25 +112,35 @@ class _Reader:
                 for name, probe in file.probes.items()
             },
             observe=file.observe,
-            reference=self.compared(),
-            reference_kind=reference.kind if reference else None,
-            reference_uncertainty=reference.uncertainty if reference else None,
-            reference_code=structs.asdict(reference.code) if reference and reference.code else None,
-            reference_remark=reference.remark if reference else "",
-            solution=self.solution,
-            tolerance=tolerance,
-            expected=expected,
-            counts=self.content.get("counts", {}),
-            units=self.content.get("units", {}),
-            selections=tuple(self.selections.values()),
+            reference=self.reference(),
         )
+        # Last: keys of all parts select groups.
+        mesh = replace(made.mesh, selections=tuple(self.selections.values()))
+        return replace(made, mesh=mesh)
 
-    def compared(self) -> dict[str, Any]:
-        """The values of the reference by key."""
-        if self.file.reference is None:
-            return {}
-        values = structs.asdict(read_marked(self.file.reference, ("reference",), self.read))
-        return {k: v for k, v in values.items() if k not in _ORIGIN and v is not None}
+    def mesh_source(self) -> dict[str, Any]:
+        """Where the mesh comes from: a file, by its path, or a recipe."""
+        mesh = dict(self.file.mesh)
+        if "file" in mesh:
+            mesh["path"] = self.path.parent / mesh.pop("file")
+        return mesh
+
+    def reference(self) -> CaseReference:
+        """What the result is compared with."""
+        tolerance, expected = self.tolerances()
+        judged = CaseReference(exact=self.solution, tolerance=tolerance, expected=expected)
+        keys = self.file.reference
+        if keys is None:
+            return judged
+        values = structs.asdict(read_marked(keys, ("reference",), self.read))
+        return replace(
+            judged,
+            values={k: v for k, v in values.items() if k not in _ORIGIN and v is not None},
+            kind=keys.kind,
+            uncertainty=keys.uncertainty,
+            code=structs.asdict(keys.code) if keys.code else None,
+            remark=keys.remark,
+        )
 
     def steps(self) -> tuple[Step, ...]:
         """The load steps; those of an exact solution with a state for each."""

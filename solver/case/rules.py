@@ -139,7 +139,7 @@ def _in_probes(case: Case) -> Iterator[Fault]:
             yield f"probes.{name}.zone", probe.zone, allowed
     for key in PROBED:
         names = {n for n, p in case.probes.items() if bool(p.zone) == (key == "pressure_at")}
-        given = case.reference.get(key)
+        given = case.reference.values.get(key)
         for name in given if isinstance(given, dict) else ():
             if name not in names:
                 kind = "with a zone" if key == "pressure_at" else "without a zone"
@@ -149,19 +149,19 @@ def _in_probes(case: Case) -> Iterator[Fault]:
 
 def _in_errors(case: Case) -> Iterator[Fault]:
     """An error against an exact solution can have a tolerance only where there is such a one."""
-    for error in case.tolerance.keys() & ERRORS.keys():
-        key, value = f"tolerance.{error}", case.tolerance[error]
-        if case.solution is None:
+    for error in case.reference.tolerance.keys() & ERRORS.keys():
+        key, value = f"tolerance.{error}", case.reference.tolerance[error]
+        if case.reference.exact is None:
             yield key, value, "needs an exact solution: reference.solution names none"
-        elif BY_NAME[error].needs not in case.solution.quantities:
-            yield key, value, f"{case.solution.name} has no {BY_NAME[error].needs}"
+        elif BY_NAME[error].needs not in case.reference.exact.quantities:
+            yield key, value, f"{case.reference.exact.name} has no {BY_NAME[error].needs}"
 
 
 def _in_works(case: Case) -> Iterator[Fault]:
     """The work of friction is known in each step."""
-    given = case.reference.get("dissipation")
-    exact = given is EXACT and case.solution is not None
-    works = case.solution.dissipation if exact and case.solution else given
+    given = case.reference.values.get("dissipation")
+    exact = given is EXACT and case.reference.exact is not None
+    works = case.reference.exact.dissipation if exact and case.reference.exact else given
     if isinstance(works, tuple) and len(works) != len(case.steps):
         allowed = f"must have a number for each of the {len(case.steps)} steps"
         more = f"; the solution has {len(works)}" if exact else ""
@@ -170,30 +170,38 @@ def _in_works(case: Case) -> Iterator[Fault]:
 
 def _in_reference(case: Case) -> Iterator[Fault]:
     """Every value of the reference feeds a check; no tolerance admits any result at all."""
-    for check, tolerance in case.tolerance.items():
+    for check, tolerance in case.reference.tolerance.items():
         if tolerance >= 1:
             allowed = "must be below 1, the error of a result that is zero"
-            if check in case.expected:
-                yield f"expected.{check}", case.expected[check], f"{MARGIN} times it {allowed}"
+            if check in case.reference.expected:
+                yield (
+                    f"expected.{check}",
+                    case.reference.expected[check],
+                    f"{MARGIN} times it {allowed}",
+                )
             yield f"tolerance.{check}", tolerance, allowed
-    for key in case.reference.keys() & _OF_CONTACT if not case.zones else ():
+    for key in case.reference.values.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         yield f"reference.{key}", None, allowed
-    for key in case.reference.keys() & _OF_FRICTION if not case.frictional else ():
+    for key in case.reference.values.keys() & _OF_FRICTION if not case.frictional else ():
         allowed = "cannot be compared: no contact zone has friction"
         yield f"reference.{key}", None, allowed
     yield from _in_works(case)
-    if "coverage" in case.reference and "contact_pressure" not in case.reference:
+    if "coverage" in case.reference.values and "contact_pressure" not in case.reference.values:
         allowed = "needs contact_pressure: it says where that acts"
         yield "reference.coverage", None, allowed
-    if case.reference_kind and not case.reference and case.solution is None:
+    if case.reference.kind and not case.reference.values and case.reference.exact is None:
         allowed = "gives no value to compare with, such as contact_pressure"
-        yield "reference.kind", case.reference_kind, allowed
-    if case.solution and not case.reference and not case.tolerance.keys() & ERRORS.keys():
-        known = [name for name in ERRORS if BY_NAME[name].needs in case.solution.quantities]
+        yield "reference.kind", case.reference.kind, allowed
+    if (
+        case.reference.exact
+        and not case.reference.values
+        and not case.reference.tolerance.keys() & ERRORS.keys()
+    ):
+        known = [name for name in ERRORS if BY_NAME[name].needs in case.reference.exact.quantities]
         allowed = "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
         allowed += f"tolerance for one of {', '.join(known)}"
-        yield "reference.solution", case.solution.name, allowed
+        yield "reference.solution", case.reference.exact.name, allowed
 
 
 def _listed_twice(case: Case) -> Iterator[Fault]:
@@ -220,7 +228,7 @@ def _in_rigid(case: Case) -> Iterator[Fault]:
             allowed = f"is a rigid {body.surface}; a rigid side is always the master"
             if name == zone.slave:
                 yield f"contact[{i}].slave", name, allowed
-            if name == zone.master and case.directions == "both":
+            if name == zone.master and case.about.directions == "both":
                 yield f"contact[{i}].master", name, f"{allowed}, so directions must be `first`"
 
 
@@ -249,17 +257,17 @@ def _not_moving(case: Case) -> Iterator[Fault]:
     for name, probe in case.probes.items():
         if probe.at:
             yield f"probes.{name}.at", list(probe.at), "group"
-    if case.solution and not _goes_along(case):
+    if case.reference.exact and not _goes_along(case):
         allowed = "a reference of values, or of half-planes with one named rigid body along x"
-        yield "reference.solution", case.solution.name, allowed
-    if "displacement" in case.reference:
+        yield "reference.solution", case.reference.exact.name, allowed
+    if "displacement" in case.reference.values:
         yield "reference.displacement", None, "displacement_at, the whole one of a group"
 
 
 def _goes_along(case: Case) -> bool:
     """Whether the exact solution of a case goes along with its rigid body, which steps move."""
     bodies = list(case.rigid.values())
-    known = case.solution is not None and case.solution.moved(0.0) is not None
+    known = case.reference.exact is not None and case.reference.exact.moved(0.0) is not None
     return known and len(bodies) == 1 and bodies[0].move.keys() == {"x"} and bool(bodies[0].name)
 
 
@@ -295,7 +303,7 @@ def _in_motion(case: Case, dim: int) -> Iterator[Fault]:
         if body.surface == "cylinder" and dim == 2:
             allowed = "is 3D: a circle is a `sphere` here, the side of a shaft a `plane`"
             yield f"bodies.{name}", body.surface, allowed
-    moments = case.reference.get("moment", {})
+    moments = case.reference.values.get("moment", {})
     for name, value in moments.items() if isinstance(moments, dict) else ():
         key = f"reference.moment.{name}"
         if name not in case.rigid:
@@ -311,9 +319,9 @@ def _in_strains(case: Case, dim: int) -> Iterator[Fault]:
         if not load.strains:
             continue
         key = f"loads[{i}].{load.kind}"
-        if case.solution:
-            allowed = f"{case.solution.name} has no initial strain; allowed: a reference without it"
-            yield key, None, allowed
+        if case.reference.exact:
+            name = case.reference.exact.name
+            yield key, None, f"{name} has no initial strain; allowed: a reference without it"
         across = {"yz", "xz"} & load.value.keys() if isinstance(load.value, dict) else set()
         if across and dim == 2:
             allowed = "across the plane of a plane case; allowed are xx, yy, zz and xy"
@@ -326,7 +334,7 @@ def _vectors(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     for i, load in enumerate(case.loads):
         if isinstance(load.value, tuple):
             yield f"loads[{i}].{load.kind}", load.value
-    for key, value in case.reference.items():
+    for key, value in case.reference.values.items():
         if isinstance(value, tuple) and key != "dissipation":
             yield f"reference.{key}", value
         if key in ("reaction", "displacement_at") and isinstance(value, dict):
@@ -345,7 +353,7 @@ def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
     for name, probe in case.probes.items():
         if probe.at:
             yield f"probes.{name}.at", probe.at
-    for made in case.selections:
+    for made in case.mesh.selections:
         if made.shape == "at":
             yield made.key, made.values
         for key, value in zip(_PARTS.get(made.shape, ()), made.values, strict=False):
@@ -358,9 +366,9 @@ def _expressions(case: Case) -> Iterable[Expression]:
     """Every expression of the case."""
     values: list[Any] = [{**support.fix, **support.spring} for support in case.supports]
     values += [load.value for load in case.loads]
-    values += case.reference.values()
+    values += case.reference.values.values()
     values += [zone.clearance for zone in case.zones]
-    values += [made.values for made in case.selections]
+    values += [made.values for made in case.mesh.selections]
     while values:
         value = values.pop()
         if isinstance(value, Expression):

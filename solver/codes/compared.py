@@ -204,7 +204,7 @@ class Compared:
     def _part(self, placed: Placed) -> Any:
         """The part of the exact solution at places; None, by place, where a body is not known."""
         known = placed.body >= 0
-        exact = self.model.case.solution
+        exact = self.model.case.reference.exact
         if exact is None or known.all():
             return self.model.part[placed.body]
         by_place = np.array(exact.part_of(placed.places, None))
@@ -290,8 +290,8 @@ class Compared:
             for check in CHECKS
             if check.concerns(case)
             and (
-                (check.key in case.reference if check.key else check.name == "balance")
-                or (check.norm == "error" and check.name in case.tolerance)
+                (check.key in case.reference.values if check.key else check.name == "balance")
+                or (check.norm == "error" and check.name in case.reference.tolerance)
             )
         ]
         observed = not case.observe

@@ -52,9 +52,9 @@ def as_layer(case: Case, mesh: meshio.Mesh) -> tuple[Case, meshio.Mesh]:
 
 def _in_space(case: Case, thickness: float) -> Case:
     held = (*case.supports, Support(group=LAYER, fix={"z": 0.0}))
-    solution = case.solution and _Plane(case.solution)
+    exact = case.reference.exact and _Plane(case.reference.exact)
     loads = tuple(_lifted(load, thickness) for load in case.loads)
-    return replace(case, plane=None, supports=held, loads=loads, solution=solution)
+    return replace(case, plane=None, supports=held, loads=loads).with_exact(exact)
 
 
 def _lifted(load: Load, thickness: float) -> Load:

@@ -95,7 +95,7 @@ class Model:
         """The reference's pressure (m,) at the centres of the slave faces; None without one."""
         from ..case.expressions import evaluate
 
-        given, exact = self.case.reference.get("contact_pressure"), self.case.solution
+        given, exact = self.case.reference.values.get("contact_pressure"), self.case.reference.exact
         centre = zone.operator.surface.centre + self.scene.coordinates.origin
         if exact is not None and "contact_pressure" in exact.quantities:
             return exact.contact_pressure(centre)
@@ -142,7 +142,7 @@ class Model:
     @cached_property
     def part(self) -> np.ndarray:
         """The part of the exact solution that each body is."""
-        exact = self.case.solution
+        exact = self.case.reference.exact
         if exact is None:
             return np.zeros(int(self.body.max()) + 1, dtype=int)
         values = ExactValues(self.solution, exact).part

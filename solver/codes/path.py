@@ -80,7 +80,8 @@ def at_last_position(
     there = replace_points(given, frames.placed(given.points, model.body))
     if foreign.mesh is not None and placer.points is not None:
         own = meshio.Mesh(frames.placed(placer.points, placer.body), foreign.mesh.cells)
-    then = replace(model.case, motion="small", steps=model.case.steps[-1:], selections=())
+    mesh = replace(model.case.mesh, selections=())
+    then = replace(model.case, motion="small", steps=model.case.steps[-1:], mesh=mesh)
     return then, replace(foreign, mesh=own, step=None, **fields), there
 
 

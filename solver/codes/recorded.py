@@ -21,7 +21,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from ..case.checks import RELATIVE
-from ..case.model import job_name
+from ..case.model import SolvedAs
 from ..case.typed import ONCE, Positive, Section, Text, Version, read_as
 from ..case.yaml import read_mapping
 from ..simulation.results.records import Cost
@@ -104,7 +104,9 @@ def _solves(family: Path) -> set[str]:
     contents = [read_mapping(path) for path in family.glob("*.yaml")]
     named = [content for content in contents if "name" in content and "mesh" in content]
     return {
-        job_name(str(content["name"]), swapped) for content in named for swapped in (False, True)
+        SolvedAs(swapped).job(str(content["name"]))
+        for content in named
+        for swapped in (False, True)
     }
 
 

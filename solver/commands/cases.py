@@ -66,16 +66,16 @@ def _refusals(path: Path, with_mesh: bool) -> Iterator[InputError]:
     try:
         case = load_case(path)
         check_mesh_file(case)
-        if "recipe" in case.mesh:
+        if "recipe" in case.mesh.source:
             from ..mesh import read_recipe
 
-            read_recipe(case.mesh, path)
+            read_recipe(case.mesh.source, path)
         if with_mesh:
             from ..simulation.fit import refusals_on
             from ..verification.run import mesh_of
 
             mesh, told = mesh_of(case), set()
-            for swapped in (False, True)[: 1 + (case.directions == "both")]:
+            for swapped in (False, True)[: 1 + (case.about.directions == "both")]:
                 for error in refusals_on(case.as_solved(swapped, None, None), mesh):
                     if str(error) not in told:
                         yield error

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..case.model import job_name
+from ..case.model import SolvedAs
 from ..system.errors import InputError, hint
 from ..system.files import hash_of
 from ..system.package import cases_folder
@@ -221,16 +221,19 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
     except Exception:  # noqa: BLE001 -- whatever it is, the solve meets it again and reports it
         yield alone
         return
-    mesh, size = [str(case.mesh["path"])] if "path" in case.mesh else None, _size(case)
+    mesh, size = (
+        [str(case.mesh.source["path"])] if "path" in case.mesh.source else None,
+        _size(case),
+    )
     own = {zone.hexahedra for zone in case.zones}
     other = "pyramids" if "hexahedra" in own else "hexahedra"
-    hexahedra = "path" in case.mesh or "HEXA" in str(case.mesh)
+    hexahedra = "path" in case.mesh.source or "HEXA" in str(case.mesh.source)
     for cut in [None, other] if variants and hexahedra else [None]:
-        for swap in [False, True] if case.directions == "both" else [False]:
+        for swap in [False, True] if case.about.directions == "both" else [False]:
             yield BatchJob(
                 family=alone.family,
                 case=case.name,
-                name=job_name(case.name, swap, cut),
+                name=SolvedAs(swap, cut).job(case.name),
                 file=str(file),
                 mesh=mesh,
                 swap=swap,
@@ -243,5 +246,5 @@ def jobs_of(file: Path, variants: bool = False) -> Iterator[BatchJob]:
 def _size(case: Case) -> Size:
     from ..mesh.size import of_mesh
 
-    path = case.mesh.get("path")
-    return of_mesh({"file": str(path)} if path else case.mesh, Path())
+    path = case.mesh.source.get("path")
+    return of_mesh({"file": str(path)} if path else case.mesh.source, Path())

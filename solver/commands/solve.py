@@ -77,12 +77,12 @@ def run_solve(options: argparse.Namespace) -> int:
 
 
 def _job(options: argparse.Namespace) -> "Job":
+    from ..case.model import SolvedAs
     from ..verification.run import Job
 
-    given = vars(options)
-    chosen = {name: given[name] for name in ("case", "mesh", "hexahedra", "recovery", "refine")}
     file, swapped = jobs.named(options.case)
-    return Job(swapped=options.swap != swapped, **chosen | {"case": file})
+    solved_as = SolvedAs(options.swap != swapped, options.hexahedra, options.recovery)
+    return Job(file, options.mesh, solved_as, options.refine)
 
 
 def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict") -> None:

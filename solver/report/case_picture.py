@@ -85,7 +85,7 @@ def _whole(
     end: float,
 ) -> View:
     """All bodies apart, with loads, supports, axes, and labels from the bodies to x = `end`."""
-    dim, length = solution.mesh.points.shape[1], solution.case.units.get("length")
+    dim, length = solution.mesh.points.shape[1], solution.case.about.units.get("length")
     share = _APART[dim] * solution.scalars.length
     screen = FLAT if dim == 2 else axonometry(mean_normal(solution))
     flat = [(p.points[p.used] + share * p.way) @ screen.T for p in drawn]
@@ -174,7 +174,7 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
     masters = [(kind, f[laid.whole(flat[f])]) for kind, f in zone.master_faces]
     zone = replace(zone, faces=faces, master_faces=masters)
     points, box = three(flat), pressed_box(flat, [zone], flat[used])
-    names = (with_unit(laid.names[0], solution.case.units.get("length")), laid.names[1])
+    names = (with_unit(laid.names[0], solution.case.about.units.get("length")), laid.names[1])
     pressure = next(iter(fields))
     second = next((name for name in (STATUS, RELATIVE) if name in fields), pressure)
     for frame, title in zip(_PLANS, dict.fromkeys((pressure, second)), strict=False):

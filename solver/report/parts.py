@@ -125,7 +125,7 @@ def carried(places: np.ndarray, nodes: np.ndarray, values: np.ndarray) -> np.nda
 
 def zone_fields(solution: Solution, zone: ZoneResult) -> dict[str, np.ndarray]:
     """Fields (m,) of a zone by title: pressure, gap, deviation from a reference if there is one."""
-    units = solution.case.units
+    units = solution.case.about.units
     found = {
         with_unit("contact pressure p", units.get("stress")): zone.multiplier,
         with_unit("gap", units.get("length")): zone.gap,

@@ -167,7 +167,7 @@ def _packed(arrays: Fields) -> dict[str, str]:
 def _nodal_fields(solution: Solution) -> Fields:
     """Fields at all nodes (n,), and errors where the case has a reference; none on rigid bodies."""
     size = np.linalg.norm(solution.displacement, axis=1)
-    units = solution.case.units
+    units = solution.case.about.units
     found = {
         with_unit("displacement |u|", units.get("length")): size,
         with_unit("normal stress σₙ", units.get("stress")): solution.fields.normal_stress,

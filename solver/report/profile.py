@@ -79,7 +79,7 @@ def draw_profile(
     The place is the distance along the interface, or what `along` says. Multipliers at nodes are
     drawn there, over their means.
     """
-    units = solution.case.units
+    units = solution.case.about.units
     means = expected(solution, zone)
     where, place = position(solution, zone, along)
     flat = solution.mesh.points.shape[1] == 2 and along is None
@@ -211,7 +211,7 @@ def _of_friction(solution: Solution, zone: ZoneResult, place: Place) -> list[dic
     for name, status in ((STUCK, 1), (SLIDING, 2)):
         mine = zone.friction.status == status
         found += _records(name, **{k: c[mine] for k, c in columns.items()}, p=traction[mine])
-    exact = solution.case.solution
+    exact = solution.case.reference.exact
     if exact and "friction_traction" in exact.quantities:
         values = ExactValues(solution, exact).of_friction(zone, "friction_traction")
         found += _records(SHEAR, s=place(zone.centre), p=signed(values))
@@ -273,7 +273,7 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 def reference(solution: Solution, key: str) -> Any:
     """What the checks compare a quantity with, checked or not; None where the case has nothing."""
-    given, exact = solution.case.reference.get(key), solution.case.solution
+    given, exact = solution.case.reference.values.get(key), solution.case.reference.exact
     if given is not None and given is not EXACT:
         return given
     return ExactValues(solution, exact) if exact and key in exact.quantities else None
@@ -281,7 +281,7 @@ def reference(solution: Solution, key: str) -> Any:
 
 def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:
     """The abscissa: its name with its unit, and its value (n,) at points (n, dim)."""
-    length = solution.case.units.get("length")
+    length = solution.case.about.units.get("length")
     if along is not None:
         return mathematics(along.text), along
     if zone.centre.shape[1] == 3:

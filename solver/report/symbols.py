@@ -130,7 +130,7 @@ class Symbols:
 
     def _words(self, entry: Load | Support) -> str:
         """What a load or a support is, in words; empty where its symbol says it."""
-        units, dim = self.solution.case.units, self.solution.mesh.points.shape[1]
+        units, dim = self.solution.case.about.units, self.solution.mesh.points.shape[1]
         if isinstance(entry, Load):
             where = f" in {entry.group}" if entry.of_cells else ""
             kind, unit = entry.kind.replace("_", " "), units.get(_UNITS.get(entry.kind, ""), "")
@@ -192,8 +192,8 @@ def _vectors(solution: Solution, load: Load, nodes: np.ndarray, outward: np.ndar
     points, value = solution.mesh.points[nodes], load.value
     outward = outward[:, : points.shape[1]]
     if value is EXACT:
-        assert solution.case.solution
-        stress = ExactValues(solution, solution.case.solution).stress(nodes)
+        assert solution.case.reference.exact
+        stress = ExactValues(solution, solution.case.reference.exact).stress(nodes)
         return traction(stress, outward)
     if isinstance(value, tuple):
         return np.stack([evaluate(part, points) for part in value], axis=1)

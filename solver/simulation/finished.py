@@ -55,7 +55,7 @@ def tell(step: str, state: Equilibrium, n_multipliers: int) -> None:
 
 def _log_forces(solution: Solution) -> None:
     """Log the forces of each step, and the largest displacement and strain of the last."""
-    if units := solution.case.units:
+    if units := solution.case.about.units:
         _LOG.log(OUTCOME, "numbers in %s", " and ".join(units.values()))
     shown = partial(_without_noise, float(np.ptp(solution.mesh.points, axis=0).max()))
     for step, given in zip(solution.steps, solution.case.steps, strict=True):

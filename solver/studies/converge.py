@@ -36,15 +36,15 @@ def convergence(
         case = load_case(path)
         for level in levels:
             refined(case, level)
-        if "path" not in case.mesh:
-            size = of_mesh(case.mesh, path.parent, levels[-1])
+        if "path" not in case.mesh.source:
+            size = of_mesh(case.mesh.source, path.parent, levels[-1])
             check_memory(int(size.points), size.dim, path)
         # What the case's own mesh is refined by comes first.
-        change = {"mesh": {"refine": f"=level*{case.mesh.get('refine', 1)}"}}
+        change = {"mesh": {"refine": f"=level*{case.mesh.source.get('refine', 1)}"}}
         series = Series(path.stem, path, change, directions="swapped" if swapped else "first")
         vary: Vary = {"level": tuple(map(float, levels))}
         groups.append(
-            StudyGroup(f"case-{number}", (series,), title=case.title or path.stem, vary=vary)
+            StudyGroup(f"case-{number}", (series,), title=case.about.title or path.stem, vary=vary)
         )
     study = Study(
         "converge",
@@ -77,7 +77,7 @@ def expected_errors(path: Path, levels: Sequence[int] = LEVELS) -> dict[str, flo
     """
     case = load_case(path)
     found: dict[str, float] = {}
-    for swapped in (False, True)[: 1 + (case.directions == "both")]:
+    for swapped in (False, True)[: 1 + (case.about.directions == "both")]:
         for name, errors in _ladder(path, swapped, levels).items():
             if len(errors) == len(levels) and min(errors) > ROUND_OFF:
                 found[name] = max(found.get(name, 0.0), at_first(levels, errors))

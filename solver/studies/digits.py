@@ -116,7 +116,7 @@ def _corners(
         [("vertex", np.arange(3)[:, None])],
         cell_sets={LOWER: [np.array([0, 1])], UPPER: [np.array([2])]},
     )
-    spec: Mapping[str, Any] = case.transform or {}
+    spec: Mapping[str, Any] = case.mesh.transform or {}
     outer = {key: value for key, value in spec.items() if key not in _INSIDE}
     foot, below, above = transform(corners, outer, str(case.path)).points
     return np.array([foot, above]), foot, (below, above)
@@ -211,11 +211,13 @@ def upper_nodes(scene: Scene) -> np.ndarray:
 
 def misplaced(case: Case, raw: meshio.Mesh, mesh: meshio.Mesh) -> np.ndarray:
     """How far (n, dim) the nodes as stored lie from where their transform puts them exactly."""
-    if not case.transform:
+    if not case.mesh.transform:
         return np.zeros_like(mesh.points)
     points = raw.points.astype(np.longdouble)
     exact = meshio.Mesh(points, raw.cells, cell_sets=raw.cell_sets, point_sets=raw.point_sets)
-    return (transform(exact, case.transform, str(case.path)).points - mesh.points).astype(float)
+    return (transform(exact, case.mesh.transform, str(case.path)).points - mesh.points).astype(
+        float
+    )
 
 
 Record = dict[str, Any]
@@ -266,8 +268,8 @@ def _attempt(point: Point, safeguards: Safeguards) -> Record:
 
 def _measured(point: Point, safeguards: Safeguards) -> Record:
     case = point.case
-    raw = _generated(json.dumps(case.mesh), str(case.path))
-    mesh = transform(raw, case.transform, str(case.path)) if case.transform else raw
+    raw = _generated(json.dumps(case.mesh.source), str(case.path))
+    mesh = transform(raw, case.mesh.transform, str(case.path)) if case.mesh.transform else raw
     state = exact_state(case, point.group.state, raw)
     clock = Clock()
     scene = build_scene(case, mesh, Options(safeguards=safeguards), clock)

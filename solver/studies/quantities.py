@@ -86,13 +86,13 @@ def _given(solution: Solution, key: str, known: float | None) -> float | None:
 
 def _reference(solution: Solution, key: str) -> Any:
     """A value of the reference, if this is exact and has one."""
-    exact = solution.case.reference_kind in ("analytical", "manufactured")
-    return solution.case.reference.get(key) if exact else None
+    exact = solution.case.reference.kind in ("analytical", "manufactured")
+    return solution.case.reference.values.get(key) if exact else None
 
 
 def _pressures(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray] | None:
     """The exact pressure (k,) at points of a zone that is covered, and the area (k,) of each."""
-    exact = solution.case.solution
+    exact = solution.case.reference.exact
     if exact is None or (zone.coverage < 1 - 1e-9).any():
         return None
     at = surface_points(solution.mesh.points, zone.faces, solution.case.axisymmetric)
@@ -101,7 +101,7 @@ def _pressures(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.nda
 
 def known_peak(solution: Solution, zone: ZoneResult) -> float | None:
     """The largest pressure of the reference or the exact solution; None where it is infinite."""
-    given, exact = _reference(solution, "contact_pressure"), solution.case.solution
+    given, exact = _reference(solution, "contact_pressure"), solution.case.reference.exact
     if isinstance(given, int | float):
         return float(given)
     if exact is None:
@@ -131,7 +131,7 @@ def _area(solution: Solution, zone: ZoneResult) -> float | None:
 
 
 def _displacement(solution: Solution) -> float | None:
-    exact = solution.case.solution
+    exact = solution.case.reference.exact
     if exact is None or "displacement" not in exact.quantities:
         return None
     nodes = np.flatnonzero(solution.deformable)
@@ -141,7 +141,7 @@ def _displacement(solution: Solution) -> float | None:
 
 def _energy(solution: Solution) -> float | None:
     """The integral of σ : ∇u / 2 of the exact solution over the mesh."""
-    exact = solution.case.solution
+    exact = solution.case.reference.exact
     if not isinstance(exact, ElasticSolution) or "gradient" not in exact.quantities:
         return None
     points, part = solution.mesh.points, ExactValues(solution, exact).part

@@ -110,16 +110,18 @@ def run_checks(
     places.
     """
     accepted = accepted or {}
-    exact = solution.case.solution and ExactValues(solution, solution.case.solution)
+    exact = solution.case.reference.exact and ExactValues(solution, solution.case.reference.exact)
     results = []
     for check in CHECKS:
-        reference: samples.Reference = solution.case.reference.get(check.key) if check.key else 0.0
+        reference: samples.Reference = (
+            solution.case.reference.values.get(check.key) if check.key else 0.0
+        )
         if reference is None or not check.concerns(solution.case):
             continue
         sampler = sampler_of(check) if samplers is None else samplers.get(check.name)
         if sampler is None:
             continue
-        tolerance = allow(check, check.tolerance_in(solution.case.tolerance))
+        tolerance = allow(check, check.tolerance_in(solution.case.reference.tolerance))
         if isinstance(reference, Exact):
             reference = exact
         for zone in solution.zones if check.by_zone else [None]:
@@ -174,7 +176,7 @@ def _judge(
         scale=scale,
         error=error,
         tolerance=tolerance,
-        expected=check.expected_in(solution.case.expected),
+        expected=check.expected_in(solution.case.reference.expected),
         regression=regression,
         passed=error <= tolerance and (regression is None or regression.passed),
         verifies=check.verifies,

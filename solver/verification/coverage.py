@@ -19,7 +19,7 @@ def expected_coverage(solution: Solution, zone: ZoneResult, reference: Any) -> n
 
     Any is right that the facets of curved surfaces at a distance explain.
     """
-    given: Any = solution.case.reference.get("coverage")
+    given: Any = solution.case.reference.values.get("coverage")
     if given is not None:
         return evaluate(given, zone.centre)
     full = np.where(1 - zone.coverage <= _passed_by(solution, zone), zone.coverage, 1.0)

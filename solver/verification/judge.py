@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..case.model import job_name
+from ..case.model import AS_WRITTEN, SolvedAs
 from ..simulation.equilibrium.state import Accuracy
 from ..simulation.judgement.validity import broken_by_facets, limits_passed
 from .scatter import unresolved
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 
 NOT_VERIFIED = "not verified: compared with no reference"
 NOT_JUDGED = "not verified: the tolerances belong to another recovery"
-# The arguments of `Case.as_solved`.
-SolvedAs = tuple[bool, str | None, str | None]
 # The checks of accuracy: their errors are relative to the reference.
 ACCURACY = (
     *NUMBERS,
@@ -90,7 +88,7 @@ def judge(
     if solution.ended:
         word, reasons = FAILED, [f"{solution.ended}; the steps before it are kept", *reasons]
     unverified = NOT_VERIFIED
-    if solution.case.reference_kind and not solution.case.reference:
+    if solution.case.reference.kind and not solution.case.reference.values:
         unverified = NOT_JUDGED
     seconds = solution.cost.seconds
     total = seconds.get("total", sum(seconds.values()))
@@ -122,7 +120,7 @@ def judge(
 def _units(solution: Solution) -> dict[str, str]:
     """The units of the case and what follows. In 3D, and on the full circle, forces are whole."""
     spatial = solution.mesh.points.shape[1] == 3 or solution.case.axisymmetric
-    return derived(solution.case.units, spatial)
+    return derived(solution.case.about.units, spatial)
 
 
 def _values(solution: Solution) -> Values:
@@ -156,14 +154,14 @@ def without_result(
     word: str,
     reason: str,
     case: Case | Path,
-    solved_as: SolvedAs = (False, None, None),
+    solved_as: SolvedAs = AS_WRITTEN,
     transient: bool = False,
     provenance: Mapping[str, str | int] | None = None,
 ) -> Verdict:
     """The verdict of a solve that was refused, failed or crashed, for the reason given.
 
-    `case` is the path of the case file where the file itself could not be read; `solved_as` are the
-    arguments of `Case.as_solved`, `provenance` what is known of its inputs.
+    `case` is the path of the case file where the file itself could not be read; `solved_as` is
+    known all the same, and `provenance` what is known of its inputs.
     """
     problem, origin = _identity(case, solved_as)
     return Verdict(
@@ -178,29 +176,29 @@ def without_result(
 
 def _identity(case: Case | Path, solved_as: SolvedAs) -> tuple[Problem, Origin]:
     """What was solved, as far as that is known, and the origin of its reference."""
-    swapped, hexahedra, recovery = solved_as
     read = None if isinstance(case, Path) else case
     name = case.stem if isinstance(case, Path) else case.name
     zones = read.zones if read else ()
     problem = Problem(
         case=name,
         family=case.parent.resolve().name if isinstance(case, Path) else case.family,
-        title=read.title if read else "",
-        job=job_name(name, *solved_as),
-        swapped=swapped,
-        direction="swapped" if swapped else "first",
-        variant=hexahedra or "",
-        recovery=recovery or "",
+        title=read.about.title if read else "",
+        job=solved_as.job(name),
+        swapped=solved_as.swapped,
+        direction="swapped" if solved_as.swapped else "first",
+        variant=solved_as.hexahedra or "",
+        recovery=solved_as.recovery or "",
         zones=[Sides(name=z.name, slave=z.slave, master=z.master) for z in zones],
     )
     if read is None:
         return problem, Origin()
+    reference = read.reference
     return problem, Origin(
-        kind=read.reference_kind,
-        uncertainty=read.reference_uncertainty,
-        code=read.reference_code,
-        remark=read.reference_remark,
-        solution=read.solution.name if read.solution else None,
+        kind=reference.kind,
+        uncertainty=reference.uncertainty,
+        code=reference.code,
+        remark=reference.remark,
+        solution=reference.exact.name if reference.exact else None,
     )
 
 
@@ -213,7 +211,7 @@ def _judged(checks: Iterable[CheckResult]) -> str:
 
 
 def _bodies(solution: Solution) -> list[Body]:
-    counts = solution.case.counts
+    counts = solution.case.mesh.counts
     return [
         Body(
             **asdict(body),

@@ -61,7 +61,7 @@ def errors(solution: Solution, exact: ExactSolution | None = None) -> dict[str, 
 
     Empty without either.
     """
-    exact = exact or solution.case.solution
+    exact = exact or solution.case.reference.exact
     if exact is None:
         return {}
     found: dict[str, float] = {}

@@ -126,7 +126,7 @@ def _write(
     write_table(file.create_group("plan"), [line._asdict() for line in solution.plan])
     write_table(file.create_group("checks"), [_flat(check) for check in checks])
     file.create_group("provenance").attrs.update(provenance)
-    label_fields(file[GRID], contact, solution.case.units)
+    label_fields(file[GRID], contact, solution.case.about.units)
 
 
 def read_result(path: str | Path) -> Result:
@@ -252,14 +252,14 @@ def _sub_faces(
 
 def _write_case(group: h5py.Group, solution: Solution) -> None:
     case = solution.case
-    group["source"] = case.source
+    group["source"] = case.about.source
     group.attrs.update(
         name=case.name,
         family=case.family,
         path=str(case.path.resolve()),
         swapped=solution.swapped,
-        hexahedra=solution.hexahedra or "",
-        recovery=case.recovery or "",
+        hexahedra=case.solved_as.hexahedra or "",
+        recovery=case.solved_as.recovery or "",
         steps=len(case.steps),
     )
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import meshio
 
 from ..case.file import HALVINGS, HALVINGS_TEXT
-from ..case.model import Case, job_name
+from ..case.model import AS_WRITTEN, Case, SolvedAs
 from ..case.reader import check_mesh_file, load_case
 from ..lac.errors import SolveError
 from ..mechanics.fem.refine import refined as refined_mesh
@@ -43,7 +43,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Job:
-    """One solve of a case: which mesh, which direction, which cut of hexahedra, which recovery.
+    """One solve of a case: on which mesh, and how.
 
     `mesh` is a mesh file taken as it is; None means the case's own, its transform applied.
     `refine` multiplies the divisions of the case's recipe. `memory_check`: refused where its memory
@@ -52,17 +52,10 @@ class Job:
 
     case: Path
     mesh: Path | None = None
-    swapped: bool = False
-    hexahedra: str | None = None
-    recovery: str | None = None
+    solved_as: SolvedAs = AS_WRITTEN
     refine: int = 1
     memory_check: bool = True
     everything: bool = False
-
-    @property
-    def solved_as(self) -> tuple[bool, str | None, str | None]:
-        """The arguments of `Case.as_solved`."""
-        return self.swapped, self.hexahedra, self.recovery
 
     def of(self, case: Case) -> Case:
         """The case as this job solves it."""
@@ -73,10 +66,10 @@ def refined(case: Case, factor: int) -> Case:
     """The case on a mesh that is finer by `factor`, and no counts to meet."""
     if factor == 1:
         return case
-    if "path" in case.mesh and factor not in HALVINGS:
+    if "path" in case.mesh.source and factor not in HALVINGS:
         raise InputError(case.path, "--refine", factor, f"of a mesh file must be {HALVINGS_TEXT}")
-    mesh = {**case.mesh, "refine": factor * case.mesh.get("refine", 1)}
-    return replace(case, mesh=mesh, counts={})
+    source = {**case.mesh.source, "refine": factor * case.mesh.source.get("refine", 1)}
+    return replace(case, mesh=replace(case.mesh, source=source, counts={}))
 
 
 def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> meshio.Mesh:
@@ -85,23 +78,23 @@ def mesh_of(case: Case, memory_check: bool = True, limited: bool = False) -> mes
     `memory_check`: MachineError before it is generated, where no solve on it could fit in memory.
     `limited`: SIGALRM ends this process if gmsh, which nothing interrupts, takes too long.
     """
-    if "path" in case.mesh:
+    if "path" in case.mesh.source:
         check_mesh_file(case)
-        mesh = read_mesh(case.mesh["path"])
-        for _ in range(HALVINGS.index(case.mesh.get("refine", 1))):
-            mesh = tidy(refined_mesh(mesh), case.mesh["path"])
+        mesh = read_mesh(case.mesh.source["path"])
+        for _ in range(HALVINGS.index(case.mesh.source.get("refine", 1))):
+            mesh = tidy(refined_mesh(mesh), case.mesh.source["path"])
     else:
         if memory_check:
-            size = of_mesh(case.mesh, case.path.parent)
+            size = of_mesh(case.mesh.source, case.path.parent)
             check_memory(int(_SURELY * size.points), size.dim, case.path)
         if limited:
             signal.alarm(MESHING_SECONDS)
         try:
-            mesh = generate(case.mesh, str(case.path))
+            mesh = generate(case.mesh.source, str(case.path))
         finally:
             if limited:
                 signal.alarm(0)
-    return transform(mesh, case.transform, str(case.path)) if case.transform else mesh
+    return transform(mesh, case.mesh.transform, str(case.path)) if case.mesh.transform else mesh
 
 
 def solve(
@@ -132,7 +125,7 @@ def solve(
         with stage(clock, "checks"):  # accepted values belong to the case's own mesh
             checks = checked(solution, job.refine == 1 and not solution.ended)
         solution.cost.cpu_seconds = processor_time() - started
-        provenance = gather(job.case, job.mesh or case.mesh.get("path")) | inputs
+        provenance = gather(job.case, job.mesh or case.mesh.source.get("path")) | inputs
         if output:
             with stage(clock, "write"):
                 sha256 = write_result(output, solution, checks, provenance)
@@ -154,14 +147,14 @@ def solve(
 
 def _inputs_of(job: Job, case: Case | None) -> dict[str, str | int]:
     """The hash of the files that the job reads, before any of them is read."""
-    name = job_name(case.name if case else job.case.stem, *job.solved_as)
-    mesh = case.mesh.get("path") if case else None
+    name = job.solved_as.job(case.name if case else job.case.stem)
+    mesh = case.mesh.source.get("path") if case else None
     return {"inputs_sha256": hash_of(input_files(job.case, Path(mesh) if mesh else None, name))}
 
 
 def _mesh_of(job: Job, case: Case, clock: Clock) -> meshio.Mesh:
     """The mesh of a job, which a solve on it fits into memory with."""
-    with stage(clock, "read" if job.mesh or "path" in case.mesh else "mesh"):
+    with stage(clock, "read" if job.mesh or "path" in case.mesh.source else "mesh"):
         mesh = read_mesh(job.mesh) if job.mesh else mesh_of(case, job.memory_check, limited=True)
     if job.memory_check:
         check_memory(len(mesh.points), mesh.points.shape[1], case.path)

@@ -112,7 +112,7 @@ def coverage(solution: Solution, zone: ZoneResult, reference: Reference) -> Samp
 def covered_pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The multiplier times the coverage."""
     expected = expected_pressure(zone, reference)
-    if "coverage" in solution.case.reference:
+    if "coverage" in solution.case.reference.values:
         expected = expected * expected_coverage(solution, zone, reference)
     return _at_macro_elements(zone.coverage * zone.multiplier, expected)
 
@@ -312,7 +312,7 @@ def norm(name: str) -> Sampler:
     """Sample an error norm, where the case gives it a tolerance."""
 
     def sample(solution: Solution, _: None, __: Reference) -> Sample | None:
-        if name not in solution.case.tolerance:
+        if name not in solution.case.reference.tolerance:
             return None
         value = solution.quality.errors.get(name, float("nan"))
         return Sample(np.array([value]), np.zeros(1), lambda _: "the whole solve")
@@ -334,7 +334,7 @@ def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
     """
     case, bodies = solution.case, {body.name: body for body in solution.bodies}
     rows = []
-    for group, given in case.counts.items():
+    for group, given in case.mesh.counts.items():
         if group not in bodies:
             allowed = f"is not a body; {hint(group, bodies)}"
             raise InputError(case.path, f"counts.{group}", group, allowed)

@@ -8,7 +8,7 @@ from solver.case.acting import Load, Support
 from solver.case.expressions import Expression
 from solver.case.file import Observation, Zone
 from solver.case.material import Material
-from solver.case.model import Case
+from solver.case.model import About, Case, CaseMesh, CaseReference
 from solver.case.reader import check_mesh_file, load_case, parse_case
 from solver.case.rigid import Rigid
 from solver.case.solutions.polynomial import Hydrostatic
@@ -20,11 +20,12 @@ def test_every_key_arrives():
     case = parse_case(FULL, PATH)
     assert case == Case(
         name="ssnp170-c",
-        family="family",
-        path=PATH,
-        title="A title",
-        source=FULL,
-        mesh={"path": Path("family/meshes/c.med")},
+        about=About(PATH, FULL, "A title", directions="first"),
+        mesh=CaseMesh(
+            source={"path": Path("family/meshes/c.med")},
+            transform={"scale": 2.0},
+            counts={"lower": {"cells": 144, "faces": 12}},
+        ),
         materials={"lower": Material(2000.0, 0.3), "upper": Material(1000.0, -0.5)},
         supports=(
             Support({"x": 0.0}, group="Sym"),
@@ -41,32 +42,33 @@ def test_every_key_arrives():
             Zone("S2", "M2", "second"),
         ),
         rigid={"die": Rigid(rigid=True)},
-        transform={"scale": 2.0},
         plane="strain",
-        directions="first",
         steps=(0.5, 1.0),
         observe=(Observation("interface", (25.0, 0.0)),),
-        reference={
-            "contact_pressure": 25.0,
-            "gap": Expression("x*0"),
-            "displacement": (0.0, Expression("-0.1*y")),
-            "stress": {"yy": -25.0, "zz": Expression("-7.5*x/x")},
-        },
-        reference_kind="analytical",
-        solution=Hydrostatic(pressure=25.0, material=Material(2000.0, 0.3), dim=2),
-        tolerance={"multiplier": 1e-6},
-        counts={"lower": {"cells": 144, "faces": 12}},
+        reference=CaseReference(
+            values={
+                "contact_pressure": 25.0,
+                "gap": Expression("x*0"),
+                "displacement": (0.0, Expression("-0.1*y")),
+                "stress": {"yy": -25.0, "zz": Expression("-7.5*x/x")},
+            },
+            exact=Hydrostatic(pressure=25.0, material=Material(2000.0, 0.3), dim=2),
+            kind="analytical",
+            tolerance={"multiplier": 1e-6},
+        ),
     )
+    assert case.family == "family"
 
 
 def test_where_a_reference_comes_from_arrives():
     origin = "reference: {kind: %s, normal_stress: 0, remark: as told}\n"
-    refined = parse_case(MINIMAL + origin % "refined, uncertainty: 2.0e-3", PATH)
-    assert (refined.reference_kind, refined.reference_uncertainty) == ("refined", 2e-3)
-    assert (refined.reference_code, refined.reference_remark) == (None, "as told")
-    other = parse_case(MINIMAL + origin % "other_code, code: {name: solver, version: '14'}", PATH)
-    assert other.reference_code == {"name": "solver", "version": "14"}
-    assert other.reference == {"normal_stress": 0.0}
+    refined = parse_case(MINIMAL + origin % "refined, uncertainty: 2.0e-3", PATH).reference
+    assert (refined.kind, refined.uncertainty) == ("refined", 2e-3)
+    assert (refined.code, refined.remark) == (None, "as told")
+    text = MINIMAL + origin % "other_code, code: {name: solver, version: '14'}"
+    other = parse_case(text, PATH).reference
+    assert other.code == {"name": "solver", "version": "14"}
+    assert other.values == {"normal_stress": 0.0}
 
 
 def test_defaults_are_those_of_the_contract():
@@ -74,13 +76,23 @@ def test_defaults_are_those_of_the_contract():
     zone = case.zones[0]
     assert (zone.hexahedra, zone.treatment, zone.normal) == ("pyramids", "lac", "element")
     assert zone.interference == 0.0
-    assert (case.directions, case.steps, case.loads, case.tolerance) == ("first", (1.0,), (), {})
-    assert (case.plane, case.transform, case.title, case.reference) == (None, None, "", {})
-    assert case.mesh == {"recipe": "blocks", "size": 1.0}
+    assert (case.about.directions, case.steps, case.loads, case.reference.tolerance) == (
+        "first",
+        (1.0,),
+        (),
+        {},
+    )
+    assert (case.plane, case.mesh.transform, case.about.title, case.reference.values) == (
+        None,
+        None,
+        "",
+        {},
+    )
+    assert case.mesh.source == {"recipe": "blocks", "size": 1.0}
 
 
 def test_one_tolerance_stands_for_all():
-    assert parse_case(MINIMAL + "tolerance: 1e-3", PATH).tolerance == {"all": 1e-3}
+    assert parse_case(MINIMAL + "tolerance: 1e-3", PATH).reference.tolerance == {"all": 1e-3}
 
 
 def test_numbers_are_floats():
@@ -102,4 +114,4 @@ def test_load_case_reads_the_file(tmp_path):
     file = tmp_path / "c.yaml"
     file.write_text(MINIMAL)
     case = load_case(str(file))
-    assert (case.path, case.family, case.source) == (file, tmp_path.name, MINIMAL)
+    assert (case.path, case.family, case.about.source) == (file, tmp_path.name, MINIMAL)

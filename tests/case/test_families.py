@@ -70,10 +70,10 @@ def test_every_expected_band_is_narrow_or_beside_one_that_is(path):
     if path.stem in ("family", "orders") or path.parent.name == "studies":
         return
     case = load_case(path) if "reference" in path.read_text() else None
-    if case is None or not case.expected or case.name in OF_THEORY:
+    if case is None or not case.reference.expected or case.name in OF_THEORY:
         return
-    wide = {name for name, error in case.expected.items() if error > 0.05}
-    narrow = {name for name, error in case.tolerance.items() if error <= 0.075}
+    wide = {name for name, error in case.reference.expected.items() if error > 0.05}
+    narrow = {name for name, error in case.reference.tolerance.items() if error <= 0.075}
     assert not {name for name in wide if name in ERRORS}
     for kind in (PRESSURES, FIELDS):
         if wide & kind:

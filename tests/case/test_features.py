@@ -79,15 +79,15 @@ def test_no_case_of_the_batch_has_a_stated_tolerance():
         for case in map(load_case, case_files(folder))
         for check in CHECKS
         if _compared(check, case)
-        and check.tolerance_in(case.tolerance) > ROUND_OFF
-        and check.expected_in(case.expected) is None
+        and check.tolerance_in(case.reference.tolerance) > ROUND_OFF
+        and check.expected_in(case.reference.expected) is None
     ]
     assert stated == []
 
 
 def _compared(check, case):
     if check.norm == "error":
-        return check.name in case.tolerance
+        return check.name in case.reference.tolerance
     if check.name.startswith("observation") and not case.observe:
         return False
-    return check.key is not None and check.key in case.reference
+    return check.key is not None and check.key in case.reference.values

@@ -16,7 +16,7 @@ def test_norms_are_integrated_on_another_mesh():
     other, of_other = results.mesh_and_case("hertz/cylinder-quad4")
     slave = results.slave_nodes(mesh, case)
     pressure = np.zeros(len(mesh.points))
-    pressure[slave] = case.solution.contact_pressure(mesh.points[slave])
+    pressure[slave] = case.reference.exact.contact_pressure(mesh.points[slave])
     cells = [(b.type, b.data) for b in mesh.cells if b.dim == 2]
     for turn in (slice(None), slice(None, None, -1)):  # cells of either orientation
         given = ForeignResult(
@@ -37,7 +37,9 @@ def test_the_error_of_a_displacement_is_integrated_on_another_mesh():
     other, case = results.mesh_and_case("polynomial/quad4")
     cells = [(block.type, block.data) for block in mesh.cells if block.dim == 2]
     body = body_numbers(len(mesh.points), dict(cells))
-    exact = case.solution.displacement(mesh.points, case.solution.node_parts(mesh.points, body))
+    exact = case.reference.exact.displacement(
+        mesh.points, case.reference.exact.node_parts(mesh.points, body)
+    )
     numbers = np.arange(len(mesh.points))
     given = Field(places=mesh.points, values=1.1 * exact, nodes=numbers)
     plain = meshio.Mesh(mesh.points, cells)

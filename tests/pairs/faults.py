@@ -61,7 +61,7 @@ def _sorted_rows(true: Any) -> Any:
 def _turned_when_exchanged(true: Any) -> Any:
     def gaps(zone: Any, operator: Any, groups: Any, *more: Any) -> np.ndarray:
         twice = 2 * zone.interference * operator.covered
-        return true(zone, operator, groups, *more) + groups.case.swapped * twice
+        return true(zone, operator, groups, *more) + groups.case.solved_as.swapped * twice
 
     return gaps
 

@@ -79,8 +79,8 @@ class _Builder(Places):
         text = self._text()
         case = parse_case(json.dumps(text), Path("pairs.yaml"))
         case, mesh = case.as_solved(swapped=self.row["form"] == "exchanged"), self.mesh()
-        if case.transform:
-            mesh = transform(mesh, case.transform, "pairs")
+        if case.mesh.transform:
+            mesh = transform(mesh, case.mesh.transform, "pairs")
         return Problem(case, mesh, self.bodies, self.placed, text, self.open)
 
     def _zone(self) -> dict[str, Any]:

@@ -117,7 +117,9 @@ def test_every_family_of_ours_tells_problem_and_reference_and_draws_solves_it_ha
     jobs = set()
     for path in set(file.parent.glob("*.yaml")) - {file, file.with_name("orders.yaml")}:
         case = load_case(path)
-        jobs |= {case.name} | ({f"{case.name}-swapped"} if case.directions == "both" else set())
+        jobs |= {case.name} | (
+            {f"{case.name}-swapped"} if case.about.directions == "both" else set()
+        )
     assert {figure.job for figure in family.figures} <= jobs
 
 

@@ -121,7 +121,9 @@ def test_springs_do_not_look_like_supports(tmp_path):
 def test_imposed_displacements_are_written(tmp_path):
     held = Support({"x": 0.0, "y": -0.5}, group="press")
     solution = with_support(tmp_path, held)
-    solution.case = replace(solution.case, units={"length": "mm"})
+    solution.case = replace(
+        solution.case, about=replace(solution.case.about, units={"length": "mm"})
+    )
     svg = draw_case(solution, "")
     assert len(shapes(svg, 3, stroke=GREEN, fill="#ffffff")) == 8
     assert "moved y -0.5 mm" in svg

@@ -35,7 +35,7 @@ def test_round_off_of_curved_faces_stays_round_off(swapped):
     case = load_case(SPHERES).as_solved(swapped)
     blocks = ("bottom", [3, 3, 1]), ("top", [2, 2, 1])
     made = {side: {"cells": "TETRA10", "divisions": n} for side, n in blocks}
-    mesh = generate(case.mesh | made, "test")
+    mesh = generate(case.mesh.source | made, "test")
     (exact,) = simulate(case, mesh).zones
     for seed in range(4):
         noise = 1e-15 * np.random.default_rng(seed).normal(size=mesh.points.shape)
@@ -52,12 +52,13 @@ def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compr
     case = point(STABILITY, sweep, mesh, x=value).case
     lower = "bottom" if "bottom" in case.materials else "all"
     soft = replace(case.materials[lower], young=young)
-    case = replace(
-        case, mesh=case.mesh | {"refine": refine}, materials={**case.materials, lower: soft}
-    )
-    raw = generate(case.mesh, "test")
+    mesh = replace(case.mesh, source=case.mesh.source | {"refine": refine})
+    case = replace(case, mesh=mesh, materials={**case.materials, lower: soft})
+    raw = generate(case.mesh.source, "test")
     exact = exact_state(case, state, raw)
-    found = simulate(case, transform(raw, case.transform, "test") if case.transform else raw)
+    found = simulate(
+        case, transform(raw, case.mesh.transform, "test") if case.mesh.transform else raw
+    )
     stress = exact.stress_at(found.fields.body == found.fields.body[found.zones[0].master_nodes[0]])
     errors = [np.abs(zone.multiplier / exact.pressure - 1).max() for zone in found.zones]
     errors.append(np.abs(found.stress - stress).max() / exact.pressure)

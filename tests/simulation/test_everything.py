@@ -105,7 +105,7 @@ def test_random_problems_whose_state_is_not_uniform(seed):
         mesh = moved(mesh, 0.02, seed)
     young, slope, clearance = 10 ** random.uniform(1, 4), random.uniform(0.2, 2), random.choice(2)
     case = block_case(dim, zone=f", clearance: '{1e-3 * clearance}*x'")
-    text = case.source.replace("pressure: 25.0", f"pressure: '1 + {slope:.3f}*x'")
+    text = case.about.source.replace("pressure: 25.0", f"pressure: '1 + {slope:.3f}*x'")
     text = text.replace(
         "all: {young: 2000.0", f"bottom: {{young: {young:.2f}, poisson: 0.2}}, top: {{young: 2000.0"
     )

@@ -233,7 +233,7 @@ def test_friction_across_a_meshed_gap_is_a_couple_and_no_imbalance():
     case = load_case(CASES / "friction" / "rigid-cylinder-tria6.yaml")
     solution = solved(case)
     assert max(solution.quality.balance.values()) < 1e-12
-    zone, exact = solution.zones[0], case.solution
+    zone, exact = solution.zones[0], case.reference.exact
     force = zone.multiplier * zone.area
     place = (force @ zone.centre[:, 0]) / force.sum()
     # The resultant is at −(2/3) ε a from the middle, which is −2 ε a from the apex (Johnson §8.2).

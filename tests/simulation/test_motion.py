@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from solver.case.model import CaseReference
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mesh import generate
@@ -238,8 +239,8 @@ def test_a_ring_that_turns_rubs_by_its_pressure():
     """Its moment is μ p 2πr², at every angle that it slid to, to the error of its polygons."""
     case = load_case(CASES / "motion/rings.yaml")
     zones = (structs.replace(case.zones[0], friction=0.2),)
-    solution = run(replace(case, zones=zones, reference={}, expected={}))
-    pressure = case.reference["contact_pressure"]
+    solution = run(replace(case, zones=zones, reference=CaseReference()))
+    pressure = case.reference.values["contact_pressure"]
     for step in solution.steps[1:]:
         moment = step.resultants["interface"].moment[2]
         assert moment == pytest.approx(-0.2 * pressure * 2 * np.pi * 10**2, rel=0.01)

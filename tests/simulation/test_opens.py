@@ -97,7 +97,7 @@ def test_a_result_of_every_cell_type_opens(solved, opened):
 
 def labelled(solution):
     case = solution.case
-    solution.case = parse_case(UNITS + case.source, case.path)
+    solution.case = parse_case(UNITS + case.about.source, case.path)
     return solution
 
 
@@ -141,4 +141,4 @@ def test_pictures_have_units(tmp_path):
 def test_units_that_are_none(given, message, tmp_path):
     case = handmade.plane(tmp_path).case
     with pytest.raises(InputError, match=message):
-        parse_case(f"units: {given}\n" + case.source, case.path)
+        parse_case(f"units: {given}\n" + case.about.source, case.path)

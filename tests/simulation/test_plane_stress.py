@@ -76,7 +76,7 @@ def test_reader_and_case_agree_on_the_material():
     case = changed_case(2, THIN)
     assert case.thin
     assert case.materials["all"] == Material(YOUNG, POISSON).in_plane_stress()
-    assert parse_case(case.source, case.path).materials == case.materials
+    assert parse_case(case.about.source, case.path).materials == case.materials
 
 
 def test_an_equivalent_of_infinite_softness_is_refused():

@@ -80,7 +80,7 @@ def test_moved_together_blocks_in_contact_carry_nothing(size):
     """Round-off of a large rigid motion is no tension: nothing opens and leaves the upper block."""
     rest = "  - {group: base, fix: {y: 0.125}}\n".replace("0.125", repr(0.1 * size))
     case = parse_case(
-        blocks("").source.replace("  - {group: base, fix: [y]}\n", rest), Path("moved.yaml")
+        blocks("").about.source.replace("  - {group: base, fix: [y]}\n", rest), Path("moved.yaml")
     )
     found = simulate(case, block_mesh("TRIA3", "QUAD8", (4, 3), size))
     assert np.abs(found.displacement[:, 1] - 0.1 * size).max() < 1e-12 * size
@@ -265,7 +265,7 @@ def test_nodal_multipliers_on_quadratic_edges_own_an_unknown(slave, alone):
 @pytest.mark.parametrize("young", [2000.0, 2.0])
 def test_a_stiffness_in_single_precision_costs_no_digit(monkeypatch, serves, young):
     """Blocks of different stiffness; where single precision does not serve, in double again."""
-    text = block_case(3).source.replace("{all: {young: 2000.0", f"{{bottom: {{young: {young}")
+    text = block_case(3).about.source.replace("{all: {young: 2000.0", f"{{bottom: {{young: {young}")
     text = text.replace("0.3}}", "0.3}, top: {young: 2000.0, poisson: 0.2}}", 1)
     case, mesh = parse_case(text, Path("patch.yaml")), block_mesh("HEXA8", "HEXA8", (6, 5))
     monkeypatch.setattr(problem, "_SINGLE_SERVES", serves)

@@ -28,7 +28,7 @@ def sphere(slave: str, master: str, swapped: bool = False) -> Scene:
         assert old in text
         text = text.replace(old, new)
     case = parse_case(text, SPHERE)
-    return build_scene(case.as_solved(swapped), generate(case.mesh, "sphere"), LEAN, Clock())
+    return build_scene(case.as_solved(swapped), generate(case.mesh.source, "sphere"), LEAN, Clock())
 
 
 @pytest.fixture(scope="module")

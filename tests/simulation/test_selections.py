@@ -186,7 +186,7 @@ def test_points_that_differ_in_the_seventh_digit_are_two_groups():
     )
     case = parsed(text + GROUPS)
     assert [load.group for load in case.loads] == ["(1.0000001, 1)", "(1.0000002, 1)"]
-    assert {made.values for made in case.selections if made.shape == "at"} == {
+    assert {made.values for made in case.mesh.selections if made.shape == "at"} == {
         (1.0000001, 1.0),
         (1.0000002, 1.0),
     }

@@ -59,7 +59,7 @@ def waves(bottom, top, young, **keys) -> dict:
 def deviation(found) -> np.ndarray:
     """What single faces have beside the exact pressure, over its peak."""
     [zone] = found.solution.zones
-    exact = found.solution.case.solution.contact_pressure(zone.centre)
+    exact = found.solution.case.reference.exact.contact_pressure(zone.centre)
     return (zone.multiplier - exact) / exact.max()
 
 

@@ -201,7 +201,7 @@ def test_facets_that_overlap_end_beside_each_other_on_a_plane_of_symmetry(lost, 
     over = 0.004
     pressure = 1000 * over / ((1.5**2 + 1) / (1.5**2 - 1) + (1 + 0.5**2) / (1 - 0.5**2))
     case = parse_case(FITTED.replace("PRESSURE", f"{pressure}"), Path("case.yaml"))
-    mesh = generate(case.mesh, "test")
+    mesh = generate(case.mesh.source, "test")
     inner = nodes_in(mesh, "bottom")
     mesh.points[inner] *= 1 + over
     x, y = mesh.points[~inner, :2].T
@@ -223,7 +223,7 @@ def test_the_flank_of_a_rounding_needs_no_partner():
         text = text.replace(name, value)
     text = text.replace("slave: floor, master: under", "slave: under, master: floor")
     text = text.replace("[4, 2]", "[20, 4]").replace("ALONG", "0")
-    mesh = generate(parse_case(text, Path("case.yaml")).mesh, "test")
+    mesh = generate(parse_case(text, Path("case.yaml")).mesh.source, "test")
     upper = nodes_in(mesh, "upper")
     x, t = mesh.points[upper, 0].copy(), 1 - mesh.points[upper, 1]
     turn = np.maximum(x - 0.5, 0) * np.pi

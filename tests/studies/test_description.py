@@ -57,7 +57,7 @@ def test_a_point_is_a_case_with_what_is_set_for_it(file):
     content = json.loads(last.source)
     assert content["mesh"]["refine"] == 4
     assert content["contact"][0]["recovery"] == "none"
-    assert (first.case.mesh["refine"], last.case.zones[0].recovery) == (1, "none")
+    assert (first.case.mesh.source["refine"], last.case.zones[0].recovery) == (1, "none")
     pair, _ = study.points(study.group("two"))
     assert json.loads(pair.source)["mesh"]["top"]["divisions"] == [3, 2]
 
@@ -115,7 +115,7 @@ def test_ours_make_valid_cases_with_names_of_their_own(path):
         assert len({p.name for p in points}) == len(points)
         for one in [*points[:2], *points[-2:]]:
             odd = one.choices.get("treatment")
-            assert one.case.mesh or odd
+            assert one.case.mesh.source or odd
 
 
 def test_values_that_are_shown_by_a_label():

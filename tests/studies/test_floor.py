@@ -20,7 +20,7 @@ def solved(dim, spec="", poisson=0.3, cells=None):
     change = ("poisson: 0.3", f"poisson: {poisson!r}")
     case = changed_case(dim, change, normal=True, extra=moved)
     raw = block_mesh(*(cells or MESHES[dim]))
-    mesh = transform(raw, case.transform) if case.transform else raw
+    mesh = transform(raw, case.mesh.transform) if case.mesh.transform else raw
     problem = ContactProblem(build_scene(case, mesh))
     return case, raw, mesh, problem, problem.solve(1.0)
 

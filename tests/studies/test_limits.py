@@ -107,7 +107,7 @@ def test_an_exact_value_that_follows_the_mesh_is_unknown():
 
 def test_the_peak_in_the_tip_of_a_wedge_is_infinite():
     case = load_case(CASES / "half-planes" / "wedge-tria6.yaml")
-    exact = case.solution
+    exact = case.reference.exact
     # Four faces of the length 1/2 on both sides of the tip, each a macro-element.
     points = np.stack([np.linspace(-1, 1, 5), np.zeros(5)], axis=1)
     faces = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])

@@ -63,7 +63,7 @@ def test_the_expected_errors_of_a_case_are_those_of_its_ladder(capsys):
     path = MANUFACTURED.parent / "bending" / "tria3-quad4.yaml"
     assert main(["expect", str(path)]) == 0
     printed = parse_mapping(capsys.readouterr().out, path)["expected"]
-    given = load_case(path).expected
+    given = load_case(path).reference.expected
     assert printed.keys() == given.keys()
     for name, error in given.items():
         assert printed[name] == pytest.approx(error, rel=0.1)

@@ -36,7 +36,7 @@ def handmade(tmp_path):
 
 
 def with_exact(solution, exact):
-    solution.case = replace(solution.case, solution=exact)
+    solution.case = solution.case.with_exact(exact)
     return solution
 
 
@@ -270,7 +270,7 @@ def measured(solution, change):
     else:
         zone = replace(zone, nodal=replace(nodal, multiplier=25 + added))
     mean = np.full(len(zone.area), 25.0)
-    return oscillation(solution.mesh.points, zone, solution.case.solution, mean)
+    return oscillation(solution.mesh.points, zone, solution.case.reference.exact, mean)
 
 
 def test_a_linear_pressure_does_not_oscillate(solution):

@@ -22,8 +22,8 @@ from tests.scenes import block_case, block_mesh, errors
 
 def retold(solution, old, new):
     """The solution of another case: its source with one part changed."""
-    assert old in solution.case.source
-    solution.case = parse_case(solution.case.source.replace(old, new), solution.case.path)
+    assert old in solution.case.about.source
+    solution.case = parse_case(solution.case.about.source.replace(old, new), solution.case.path)
 
 
 @pytest.fixture(params=[plane, solid])
@@ -102,14 +102,14 @@ def test_a_solve_without_contact_comes_back(tmp_path):
 def test_the_case_comes_back_from_its_source(solution, written):
     solution.case.path.unlink()
     case = read_result(written).solution.case
-    assert case.source == solution.case.source
-    assert (case.name, case.zones, case.materials, case.tolerance) == (
+    assert case.about.source == solution.case.about.source
+    assert (case.name, case.zones, case.materials, case.reference.tolerance) == (
         solution.case.name,
         solution.case.zones,
         solution.case.materials,
-        solution.case.tolerance,
+        solution.case.reference.tolerance,
     )
-    assert case.reference == solution.case.reference
+    assert case.reference.values == solution.case.reference.values
 
 
 def test_checks_of_the_file_are_those_of_the_solve(solution, written):
@@ -135,7 +135,7 @@ def test_the_layout_is_plain_hdf5(tmp_path):
             *("VTKHDF", "case", "solve", "contact", "bodies", "balance", "steps", "observation"),
             *("plan", "timings", "checks", "provenance"),
         }
-        assert file["case/source"].asstr()[()] == solution.case.source
+        assert file["case/source"].asstr()[()] == solution.case.about.source
         assert file["case"].attrs["name"] == "hexahedron-on-wedges"
         assert file["case"].attrs["family"] == tmp_path.name
         assert bool(file["case"].attrs["swapped"])

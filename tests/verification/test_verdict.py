@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from solver.case.model import SolvedAs
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.flat import flat, to_json
@@ -123,7 +124,7 @@ def test_the_other_direction_exchanges_slave_and_master(tmp_path):
 @pytest.mark.parametrize("word", ["refused", "failed", "crashed"])
 def test_a_solve_without_an_end_has_the_same_keys(tmp_path, word):
     solution = plane(tmp_path)
-    verdict = without_result(word, "said why", solution.case, (True, None, None)).plain()
+    verdict = without_result(word, "said why", solution.case, SolvedAs(swapped=True)).plain()
     assert verdict.keys() == verdict_of(solution).keys()
     assert (verdict["verdict"], verdict["passed"], verdict["reason"]) == (word, False, "said why")
     assert verdict["job"] == "two-blocks-swapped"
@@ -279,7 +280,9 @@ def test_the_verdict_says_where_the_reference_comes_from(tmp_path):
 
 
 def judged(solution, tolerance, expected=()):
-    case = replace(solution.case, tolerance=tolerance, expected=dict(expected))
+    reference = solution.case.reference
+    reference = replace(reference, tolerance=tolerance, expected=dict(expected))
+    case = replace(solution.case, reference=reference)
     return judge(replace(solution, case=case), run_checks(replace(solution, case=case)))
 
 

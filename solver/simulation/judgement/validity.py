@@ -284,7 +284,11 @@ def remarks(found: Validity) -> Iterator[Line]:
 
 def allowed_of_pressure(case: Case, limit: float) -> float:
     """The limit of an error of the pressure, or the case's own tolerance where it is wider."""
-    own = (case.tolerance[check] for check in OF_PRESSURE if check in case.tolerance)
+    own = (
+        case.reference.tolerance[check]
+        for check in OF_PRESSURE
+        if check in case.reference.tolerance
+    )
     return max(limit, *own, 0.0)
 
 
@@ -315,7 +319,7 @@ def limits_passed(case: Case, found: Validity) -> list[str]:
         )
     if why := broken_by_facets(case, found):
         reasons.append(why)
-    if case.solution is not None:
+    if case.reference.exact is not None:
         return reasons
     if max(found.strain, found.rotation) > _SMALL_STRAIN:
         reasons.append(

@@ -264,12 +264,7 @@ class Solution:
     @property
     def swapped(self) -> bool:
         """Whether slave and master were exchanged."""
-        return self.case.swapped
-
-    @property
-    def hexahedra(self) -> str | None:
-        """The cut of slave hexahedra, if it overrides the case's."""
-        return self.case.hexahedra
+        return self.case.solved_as.swapped
 
     @property
     def reactions(self) -> list[Reaction]:

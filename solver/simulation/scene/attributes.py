@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -48,9 +47,9 @@ class Attributes(CutGroups):
 
     @property
     def _exact(self) -> ExactSolution:
-        if self.case.solution is None:
+        if self.case.reference.exact is None:
             raise AssertionError("a value is taken from a solution that the case does not name")
-        return self.case.solution
+        return self.case.reference.exact
 
     def by_part(self, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
         """Cells or faces (n, n_nodes) by the part of the exact solution in which they lie."""
@@ -196,8 +195,9 @@ class Attributes(CutGroups):
 
     def with_solution(self, solution: ExactSolution) -> Attributes:
         """The same with the fields of another exact solution."""
-        case = replace(self.case, solution=solution)
-        return Attributes(case, self.mesh, self.cut, self.zones, self.origin)
+        return Attributes(
+            self.case.with_exact(solution), self.mesh, self.cut, self.zones, self.origin
+        )
 
     def _state(self, solution: ExactSolution) -> tuple[np.ndarray, np.ndarray]:
         then = self.with_solution(solution)

@@ -134,7 +134,7 @@ def _named(case: Case) -> set[str]:
     held += [support.cyclic.of for support in case.supports if support.cyclic]
     loaded = [load.group for load in case.loads]
     probed = [name for probe in case.probes.values() for name in (probe.group, probe.within)]
-    return {*case.materials, *case.rigid, *case.counts, *sides, *held, *loaded, *probed}
+    return {*case.materials, *case.rigid, *case.mesh.counts, *sides, *held, *loaded, *probed}
 
 
 class _Groups:
@@ -291,7 +291,7 @@ class _Groups:
     def check_bodies(self) -> None:
         for group in self.case.rigid:
             self.cells(f"bodies.{group}", group, self.dim)
-        for group in self.case.counts:
+        for group in self.case.mesh.counts:
             self.cells(f"counts.{group}", group, self.dim)
 
     def check_probes(self) -> None:
@@ -312,7 +312,7 @@ class _Groups:
                 "bodies in contact share no nodes"
             )
             raise self.error(keys["master"], zone.master, allowed)
-        for side in ("slave", "master") if self.case.directions == "both" else ("slave",):
+        for side in ("slave", "master") if self.case.about.directions == "both" else ("slave",):
             self.check_deformable(keys[side], getattr(zone, side), parts[side])
 
     def check_deformable(self, key: str, group: str, parts: list[np.ndarray]) -> None:

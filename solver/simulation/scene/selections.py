@@ -25,7 +25,7 @@ def with_groups(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
     Raises InputError where one is empty.
     """
     check_dimension(case, mesh.points.shape[1])
-    if case.selections:
+    if case.mesh.selections:
         mesh = _with_selections(case, mesh)
     attached = nodes_of_volumes(mesh)
     if case.rigid:
@@ -43,9 +43,9 @@ def _with_selections(case: Case, mesh: meshio.Mesh) -> meshio.Mesh:
         cell_sets={name: list(parts) for name, parts in mesh.cell_sets.items()},
     )
     given = {block.type: len(block.data) for block in mesh.cells}
-    if any(selection.of == "faces" for selection in case.selections):
+    if any(selection.of == "faces" for selection in case.mesh.selections):
         mesh = _with_outer_faces(mesh)
-    for selection in case.selections:
+    for selection in case.mesh.selections:
         if selection.name in {ALL, *mesh.cell_sets, *mesh.point_sets}:
             allowed = "the mesh has a group of this name; give another one"
             raise InputError(case.path, selection.key, selection.name, allowed)

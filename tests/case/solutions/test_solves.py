@@ -98,7 +98,7 @@ def solved(text, folder, swapped=False):
     path = folder / "case.yaml"
     path.write_text(text, encoding="utf-8")
     case = parse_case(text, path)
-    solution = simulate(case.as_solved(swapped), generate(case.mesh, str(path)))
+    solution = simulate(case.as_solved(swapped), generate(case.mesh.source, str(path)))
     solution.quality.errors = errors(solution)
     return solution
 

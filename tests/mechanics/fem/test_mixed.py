@@ -39,7 +39,7 @@ def patch(bottom, top, counts, material, move=0.0, options=LEAN, **as_solved):
     if move:
         mesh = straightened(moved(mesh, move))
     dim = mesh.points.shape[1]
-    source = block_case(dim).source.replace("{all: {young: 2000.0, poisson: 0.3}}", material)
+    source = block_case(dim).about.source.replace("{all: {young: 2000.0, poisson: 0.3}}", material)
     case = parse_case(source, Path("patch.yaml")).as_solved(**as_solved)
     solution = simulate(case, mesh, options)
     pressure = np.abs(solution.zones[0].multiplier / 25 - 1).max()
@@ -128,7 +128,7 @@ def test_how_many_unknowns_a_cell_has(name, size):
 
 def test_the_pieces_of_a_cut_cell_share_their_constant():
     mesh = block_mesh("HEXA8", "HEXA8", (2, 1))
-    case = parse_case(block_case(3).source.replace("0.3", "0.4999999"), Path("patch.yaml"))
+    case = parse_case(block_case(3).about.source.replace("0.3", "0.4999999"), Path("patch.yaml"))
     scene = build_scene(case, mesh)
     [part] = scene.parts
     assert part.mean.size == 2**3 + 1
@@ -141,7 +141,7 @@ def test_the_pieces_of_a_cut_cell_share_their_constant():
 def test_ordinary_material_stays_as_it_is():
     mesh = block_mesh("TRIA6", "QUAD8", (3, 2))
     plain, chosen, mixed = (
-        simulate(parse_case(block_case(2).source.replace("0.3", p), Path("patch.yaml")), mesh)
+        simulate(parse_case(block_case(2).about.source.replace("0.3", p), Path("patch.yaml")), mesh)
         for p in ("0.3", "0.3, form: displacement", "0.3, form: mixed")
     )
     assert not plain.fields.mean_stress
@@ -155,7 +155,7 @@ def test_ordinary_material_stays_as_it_is():
 
 @pytest.mark.parametrize(("poisson", "mixed"), [(0.499, False), (0.4991, True)])
 def test_it_is_taken_above_the_bound(poisson, mixed):
-    case = parse_case(block_case(2).source.replace("0.3", str(poisson)), Path("patch.yaml"))
+    case = parse_case(block_case(2).about.source.replace("0.3", str(poisson)), Path("patch.yaml"))
     scene = build_scene(case, block_mesh("QUAD4", "QUAD4"))
     assert bool(scene.parts) is mixed
 
@@ -166,7 +166,7 @@ def test_it_is_taken_above_the_bound(poisson, mixed):
 )
 def test_what_is_refused(given, key):
     with pytest.raises(InputError, match=key):
-        parse_case(block_case(2).source.replace("0.3", given), Path("patch.yaml"))
+        parse_case(block_case(2).about.source.replace("0.3", given), Path("patch.yaml"))
 
 
 # Locking

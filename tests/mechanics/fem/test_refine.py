@@ -100,7 +100,7 @@ def test_a_mesh_file_is_refined_by_its_case(tmp_path):
         flat, np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)[:, ::-1]
     )
     write_mesh(tidy(ring, "ring"), tmp_path / "ring.vtkhdf")
-    text = block_case(2).source.replace(
+    text = block_case(2).about.source.replace(
         "{recipe: blocks, size: 1.0}", f"{{file: {tmp_path}/ring.vtkhdf, refine: 4}}"
     )
     case = parse_case(text, Path("ring.yaml"))

@@ -50,7 +50,7 @@ def test_a_pressure_that_alternates_from_node_to_node_shows(tmp_path):
     exact = SOLUTIONS["uniform_compression"](
         pressure=25.0, base=-50.0, lower=steel, upper=steel, dim=2
     )
-    solution.case = replace(solution.case, solution=exact)
+    solution.case = solution.case.with_exact(exact)
 
     def alternating(x):
         order = np.argsort(np.argsort(x[:, 0]))
