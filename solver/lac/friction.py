@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from .facets import tangents_of
 from .multipliers import MASTER, SLAVE, Integrals
@@ -77,10 +78,40 @@ def along_faces(segments: Segments, tangent: Tangent) -> np.ndarray:
     >>> along_faces(segments, tilted)[0, 0].round(15).tolist()
     [1.0, 0.0]
     """
-    n = segments.normal
     a, t = (vectors[segments.macro][:, None] for vectors in tangent)
+    return _turned(t, a, segments.normal)
+
+
+def _turned(t: np.ndarray, a: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Vectors t across the unit vectors a, by the smallest rotation from these to n."""
     out, level = ((vectors * n).sum(axis=-1, keepdims=True) for vectors in (t, a))
     return np.asarray(t - out / (1 + level) * (a + n))
+
+
+def of_tractions(matrix: sparse.csr_matrix, normal: np.ndarray) -> sparse.csr_matrix:
+    """A reconstruction (m · k, m) for tractions by tangent: (d · m · k, d · m), d = dim − 1.
+
+    The frames of neighbours differ, also by the round-off of their mean normals (m, dim): tangents
+    are turned to the plane of the macro-element that the matrix reconstructs on.
+
+    The second of two macro-elements gets what the first one has. By round-off in their normals
+    their first tangents are along x and along −y:
+
+    >>> normal = np.array([[1e-17, 0.0, 1.0], [0.0, 1e-17, 1.0]])
+    >>> copied = of_tractions(sparse.csr_matrix([[0.0, 0.0], [1.0, 0.0]]), normal)
+    >>> (copied.toarray()[[1, 3]].round(12) + 0.0).tolist()
+    [[0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0]]
+    """
+    pairs, along = matrix.tocoo(), tangents_of(normal)
+    k, other = matrix.shape[0] // matrix.shape[1], pairs.col
+    own = pairs.row // k
+    turned = _turned(along[other], normal[other][:, None], normal[own][:, None])
+    shares = np.einsum("ptd,psd->tsp", along[own], turned)
+    blocks = [
+        [sparse.coo_array((share * pairs.data, pairs.coords), matrix.shape) for share in row]
+        for row in shares
+    ]
+    return sparse.csr_matrix(sparse.block_array(blocks))
 
 
 def turned_along(part: Integrals, tangent: Tangent) -> Integrals:

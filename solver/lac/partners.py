@@ -7,12 +7,13 @@ surfaces have their quadrature points here, too.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from .cells.faces import circumference
 from .cells.shape import Rule, face_rule
 from .facets import Facets, measured
 from .segments import Segments
@@ -64,8 +65,11 @@ def sampled(block: Facets, rule: Rule) -> Samples:
     ([[2.0]], [[0.5, 0.5]], [[[0.0, 1.0]]])
     """
     places, weights = rule
-    values, vectors = measured(block, places)
+    # In the meridian plane: on the axis a ring has no area, but the face a normal.
+    values, vectors = measured(replace(block, axisymmetric=False), places)
     measure = np.linalg.norm(vectors, axis=2)
+    if block.axisymmetric:
+        measure = measure * circumference(values @ block.corner)
     if block.directions is not None:
         vectors = np.einsum("qa,fad->fqd", values, block.directions)
     normal = vectors / np.linalg.norm(vectors, axis=2, keepdims=True)

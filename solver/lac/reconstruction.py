@@ -23,11 +23,11 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy import sparse
 
-# A macro-element covered by less than this share of its area is no neighbour: its mean is of
-# little use to others.
-MIN_SHARE = 0.25
+# A macro-element covered by less than a quarter of its area is no neighbour: its mean is of little
+# use to others. Meshes have exact quarters, and kinks of exactly 30°: rounding decides neither.
+MIN_SHARE = 0.25 - 1e-9
 # Neighbours' normals differ by less than 30°: across a kink the pressure may jump.
-_SAME_SIDE = np.cos(np.radians(30))
+_SAME_SIDE = np.cos(np.radians(30)) + 1e-9
 # Neighbours lie on one side where their mean direction is longer than this; unit vectors to the
 # five neighbours of a square at a border have a mean of 0.48.
 _ONE_SIDE = 0.4
@@ -267,13 +267,12 @@ def _fit(
         system = np.concatenate([system, own], axis=1)
     if form.degree == 1 and at.local.centre.shape[1] == 3:
         system = np.concatenate([system, _across(system)], axis=1)
-    size = np.linalg.norm(system, axis=1)
-    some = size > _NOTHING * size.max(axis=1, keepdims=True)
-    system *= np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
+    scale = _scale(system, at.local.axes.shape[1], form)
+    system = system @ scale
     squares, vectors = np.linalg.eigh(system.swapaxes(1, 2) @ system)
     solved = squares[:, 0] > _RANK**2 * squares[:, -1]
     v, scaled = vectors[solved], system[solved, : other.shape[1]]
-    inverse = v / squares[solved][:, None] @ v.swapaxes(1, 2) / size[solved][:, :, None]
+    inverse = scale[solved] @ (v / squares[solved][:, None]) @ v.swapaxes(1, 2)
     by_neighbour = inverse @ scaled.swapaxes(1, 2) * weight[solved][:, None]
     values = np.concatenate([by_neighbour, -by_neighbour.sum(axis=2, keepdims=True)], axis=2)
     columns = np.concatenate([other[solved], chosen[solved][:, None]], axis=1)
@@ -285,6 +284,29 @@ def _fit(
         rows[:, :, None], columns[:, None], values[:, shape < k]
     )
     return solved, (row.ravel(), column.ravel(), value.ravel())
+
+
+def _scale(system: np.ndarray, d: int, form: Form) -> np.ndarray:
+    """The functions (n, k, k), as sums of those of systems (n, w, k), that fits are judged in.
+
+    In d coordinates in which neighbours lie alike in all directions; all squares have one scale.
+    Whether a fit is determined then depends on no direction of the axes.
+    """
+    squares, vectors = np.linalg.eigh(system[..., :d].swapaxes(1, 2) @ system[..., :d])
+    some = squares > _NOTHING * squares.max(axis=1, keepdims=True)
+    root = np.where(some, 1 / np.sqrt(np.where(some, squares, 1.0)), 0.0)
+    turn = (vectors * root[:, None]) @ vectors.swapaxes(1, 2)
+    found = np.tile(np.eye(system.shape[2]), (len(system), 1, 1))
+    found[:, :d, :d] = turn
+    pairs = list(combinations_with_replacement(range(d), 2)) if form.degree == 2 else []
+    for i, (a, b) in enumerate(pairs, start=d):
+        for j, (c, e) in enumerate(pairs, start=d):
+            both = turn[:, a, c] * turn[:, b, e] + (a != b) * turn[:, b, c] * turn[:, a, e]
+            found[:, i, j] = both if c == e else np.sqrt(2) * both
+    for part in (slice(d, d + len(pairs)), slice(d + len(pairs), None)):
+        size = np.linalg.norm(system @ found[..., part], axis=(1, 2))
+        found[..., part] /= np.where(size > 0, size, 1.0)[:, None, None]
+    return found
 
 
 def _across(system: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ from scipy.sparse.csgraph import connected_components
 _ROUNDS = 3
 # Normals that differ by less are those of a flat surface.
 _BENT = 1e-9
-# Normals of neighbours that differ by less belong to one smooth surface.
-_KINK = np.cos(np.radians(40))
+# Normals of neighbours that differ by less, in more than rounding, belong to one smooth surface.
+_KINK = np.cos(np.radians(40)) + 1e-9
 # Vertices this near to a quadric, by the size of the surface, lie on it.
 _NEAR = 1e-5
 # A quadric has ten coefficients: it passes through so many vertices by chance.

@@ -50,7 +50,7 @@ def laid_flat(zone: ZoneResult) -> LaidFlat:
     middle = _middle(normal, centre)
     if middle is None:
         return _seen_along(zone.normal.mean(axis=0))
-    _, sizes, axes = np.linalg.svd(normal, full_matrices=False)
+    _, sizes, axes = np.linalg.svd(np.concatenate([normal, np.zeros((3, 3))]), full_matrices=False)
     if sizes[2] <= _ROUND * sizes[0]:
         return _unrolled(axes[2], *middle, centre.mean(axis=0))
     return _from_pole(*middle, centre.mean(axis=0))

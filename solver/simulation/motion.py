@@ -241,9 +241,15 @@ def _joined(case: Case, found: Sequence[Solution]) -> Solution:
 
 
 def _position(step: Solution, kept: tuple[dict[str, np.ndarray], ...]) -> Position:
-    """Where a step left the bodies: a file has the fields of the last step at all positions."""
+    """Where a step left the bodies: a file has the fields of the last step at all positions.
+
+    A recovered pressure that the step has not is NaN.
+    """
     pairs = zip(grid_fields(step), kept, strict=True)
-    fields = ({k: v for k, v in own.items() if k in last} for own, last in pairs)
+    fields = (
+        {k: own[k] if k in own else np.full_like(value, np.nan) for k, value in last.items()}
+        for own, last in pairs
+    )
     return Position(step.mesh.points, *fields)
 
 

@@ -11,14 +11,19 @@ import numpy as np
 from ..case.expressions import evaluate
 from ..mechanics.fem.stress import COMPONENTS
 from ..simulation.equilibrium.constraints import MIN_COVERAGE
+from ..simulation.equilibrium.state import stress_of_motion
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint
 from .coverage import expected_coverage
 from .samples import Reference, Sample, Sampler, by_component
 
-# A largest traction below this share of the load is zero.
-_ROUND_OFF = 1e-5
+# Where the pressures of the last step are below this share of the largest of all steps, or of the
+# stress that the displacement could cause, the law is judged by that share: forces are rounded on
+# their scale. Slips as well.
+_LITTLE, _LITTLE_OF_MOTION = 1e-3, 1e-6
+# Of the model's length: a way below it is none.
+_NO_WAY = 1e-10
 
 
 def contact_force(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
@@ -114,13 +119,16 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
         getattr(zone.friction, name) for name in ("friction_traction", "slip", "status")
     )
     bound, far = mu * zone.multiplier, np.linalg.norm(slip, axis=1)
-    least = _ROUND_OFF * solution.scalars.load_scale
-    largest, farthest = max(float(bound.max()), least) or 1.0, float(far.max()) or 1.0
+    gone = np.linalg.norm(zone.friction.slip_total, axis=1)
+    length = solution.scalars.length
+    caused = stress_of_motion(solution.case, length, solution.displacement)
+    least = mu * max(_LITTLE * solution.largest_pressure, _LITTLE_OF_MOTION * caused)
+    largest = max(float(bound.max()), least) or 1.0
+    farthest = max(float(far.max()), _LITTLE * float(gone.max())) or 1.0
     size = np.linalg.norm(traction, axis=1)
     apart = traction * far[:, None] - bound[:, None] * slip
     work = np.array([step.dissipation for step in solution.steps])
-    gone = np.linalg.norm(zone.friction.slip_total, axis=1)
-    way = float(gone.max(initial=_ROUND_OFF**2 * solution.scalars.length))
+    way = float(gone.max(initial=_NO_WAY * length))
     most = max(float(np.abs(work).sum()), least * float(zone.area.sum()) * way)
     rows = {
         "traction beyond μp of": np.maximum(size - bound, 0.0) / largest,

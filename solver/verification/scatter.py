@@ -37,15 +37,17 @@ have 0.22 and more: press fits and loaded rings and spheres of linear faces with
 """
 # Neighbours are nearer than this many sizes of the macro-element along its axes.
 _REACH = 1.3
-# Neighbours' normals differ by less than 30°: across a kink the pressure may jump.
-_SAME_SIDE = np.cos(np.radians(30))
+# Neighbours' normals differ by less than 30°, in more than rounding: across a kink the pressure may
+# jump.
+_SAME_SIDE = np.cos(np.radians(30)) + 1e-9
 # A fit is determined where the squares of its matrix are above the first share of their number, and
 # is no extrapolation where the mean place of the neighbours is nearer than the second.
 _RANK, _CENTRED = 0.03, 0.3
 # Neighbours in a line have no part across it, up to rounding.
 _IN_LINE = 1e-9
-# Pressures below this share of the stress that loads or the displacement could cause are rounding.
-_ROUNDING = 1e-13
+# Pressures below this share of those of all steps, or of the stress that the displacement could
+# cause, are rounding.
+_ROUNDING = 1e-12
 # A macro-element that is covered by less than this has a mean of another place.
 _COVERED = 0.99
 
@@ -58,7 +60,7 @@ def unresolved(solution: Solution) -> str:
     case, moved = solution.case, solution.displacement
     limit = allowed_of_pressure(case, LIMIT)
     caused = stress_of_motion(case, solution.scalars.length, moved)
-    rounding = _ROUNDING * max(caused, solution.scalars.load_scale)
+    rounding = _ROUNDING * max(caused, solution.largest_pressure)
     for given, zone in zip(case.zones, solution.zones, strict=True):
         peak = zone.multiplier[zone.closed].max(initial=0.0)
         if zone.nodal is not None or not peak > rounding:

@@ -33,8 +33,9 @@ ROUND_OFF = 8 * np.finfo(float).eps
 _CONVERGED = 1e-8
 # A refinement aims at this share of round-off, and at no smaller a gain.
 _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
-# A macro-element's own coefficient must not be smaller than this share of its row's largest.
-_SMALLEST_PIVOT = 1e-6
+# A macro-element's own coefficient must not be smaller than this share of its row's largest: the
+# condensed matrix loses twice as many digits.
+_SMALLEST_PIVOT = 1e-2
 # Zones whose slave surface is a master surface, one after another.
 _LAYERS = 4
 _NO_SPRINGS = np.empty(0)

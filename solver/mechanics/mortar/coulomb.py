@@ -15,6 +15,7 @@ solution methods, CMAME 92 (1991) 353–375.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
 from itertools import islice
@@ -37,6 +38,9 @@ _WIDE = 1e4
 _ROUGH = 1e6
 UNIQUE = 1.0
 """Up to this coefficient the first state found is taken for the only one."""
+# Jumps that bring up so many times the forces wanted are, up to the rounding of S, the motion of a
+# free body. The springs that hold it have a share of the stiffness.
+_FREE, _WEAK = 1e6, 1e-8
 # A step of the line search is halved down to this.
 _SHORTEST = 1e-3
 # Of a way between forces, the share that is tried first; of any way, the smallest part.
@@ -99,9 +103,9 @@ class CoulombContact:
 
         From z = `guess` (r,) by plain steps; else from where all is closed and slips, as after a
         long way; else from where all that is closed sticks; else with a line search; else by way of
-        forces between the `last` ones (r,) and λ₀, or of larger coefficients. Where μ is above 1
-        there may be several states: then from the first two, and the state in which most of the
-        contact stays closed is taken. Forces that are round-off of a `scale` are none.
+        forces between the `last` ones (r,) and λ₀, or of larger or smaller coefficients. Where μ is
+        above 1 there may be several states: then from the first two, and the state in which most of
+        the contact stays closed is taken. Forces that are round-off of a `scale` are none.
 
         Springs without coupling in n and t, pressed by 2 and pulled by 1.5, μ = 1/2: it slips by
         what the bound 1 leaves of the pull.
@@ -139,6 +143,7 @@ class CoulombContact:
             yield self._along(last, start)
         if stuck is not None:
             yield self._by_friction(stuck, start)
+        yield self._from_smooth(start)
 
     def _with(self, friction: np.ndarray) -> Self:
         """The same contact with other coefficients (f,)."""
@@ -155,6 +160,17 @@ class CoulombContact:
             return self._with(larger)._newton(z, start, False)
 
         return _by_way(z, end, 1.0, found_at)
+
+    def _from_smooth(self, start: np.ndarray) -> _Found | None:
+        """The law fulfilled by way of smaller coefficients, from none on."""
+        smooth = self._with(np.zeros_like(self.friction))
+        z = smooth._sliding(start)
+        found = smooth._newton(z, start, False) or smooth._newton(z, start, True)
+
+        def found_at(gone: float, z: np.ndarray) -> _Found | None:
+            return self._with(gone * self.friction)._newton(z, start, False)
+
+        return None if found is None else _by_way(found[1], 1.0, _FIRST, found_at)
 
     def _sticking(self, start: np.ndarray) -> np.ndarray | None:
         """The jumps z (r,) where all that is closed sticks, however large its traction."""
@@ -300,18 +316,22 @@ class CoulombContact:
         rows: np.ndarray,
         wanted: np.ndarray,
     ) -> np.ndarray:
-        """The jumps (s,) in `rows` whose linear `fault` is the `wanted` one (s,); NaN where none.
+        """The jumps (s,) in `rows` whose linear `fault` is the `wanted` one (s,).
 
+        Where these leave a body free to move, weak springs hold it: it goes where forces push it.
         `fault` takes jumps (r, j) and the forces (r, j) they bring up, column by column.
         """
         size, count = len(self.c), len(rows)
         if isinstance(self.stiffness, np.ndarray):
             unit = np.zeros((size, count))
             unit[rows, np.arange(count)] = 1.0
-            try:
-                return np.linalg.solve(fault(unit, self.stiffness[:, rows]), wanted)
-            except np.linalg.LinAlgError:
-                return np.full(count, np.nan)
+            scale = np.where(self.c > 0, self.c, 1.0)[rows]
+            matrix = fault(unit, self.stiffness[:, rows]) / scale
+            with suppress(np.linalg.LinAlgError):
+                found = np.linalg.solve(matrix, wanted)
+                if np.abs(found).max(initial=0.0) < _FREE * np.abs(wanted).max(initial=0.0):
+                    return np.asarray(found / scale)
+            return np.asarray(np.linalg.solve(matrix + _WEAK * np.eye(count), wanted) / scale)
 
         def product(values: np.ndarray) -> np.ndarray:
             z = np.zeros((size, 1))

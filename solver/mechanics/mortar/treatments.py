@@ -193,9 +193,9 @@ def scheme_of(name: str, points: int | None) -> Scheme:
 
 # A node is held along its normal where less than this share of a motion that way is free.
 _HELD = 1e-12
-# Normals of two zones at a node are independent from an angle of this sine on, 30 degrees: half the
-# angle between two faces of a coarse smooth surface is no corner.
-_INDEPENDENT = 0.5
+# Normals of two zones at a node are independent from an angle of this sine on, 30 degrees up to
+# rounding: half the angle between two faces of a coarse smooth surface is no corner.
+_INDEPENDENT = 0.5 - 1e-9
 
 
 def merge_fixed_multipliers(

@@ -46,6 +46,7 @@ class Search:
         self.jump = last.jump if last else np.zeros(len(numbers))
         self.total = last.total if last else np.zeros(len(numbers))
         self.last = before.pressure if before else None
+        self.closed = before.status.closed if before else None
         self.count = 0
 
     def settled(self, correction: np.ndarray | float = 0.0) -> Equilibrium:
@@ -62,32 +63,49 @@ class Search:
         at_rest = area * start.pressure[base.eligible]
         at_work = forces_at_work(self.problem.scene, start.displacement)
         solution = contact.solve(at_rest, gone, last, at_work)
-        if solution is None:
-            raise SolveError(self._why_none())
+        if solution is None or self._is_nothing(solution[0], at_work):
+            return self._resting(at_work, correction)
         forces, z, steps = solution
         _LOG.info("friction: %d Newton steps", steps)
-        nothing = not contact.statuses(forces, z)[0].any()
-        found = self._freed(forces, z, correction) if nothing else None
-        if found is None:
-            scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
-            found, forces, z = self._corrected(z, scale, correction)
-            found = self._freed(forces, z, correction) or found
-        self._refuse_unheld(forces, at_work)
+        scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
+        corrected = self._corrected(z, scale, correction)
+        if corrected is None:
+            return self._resting(at_work, correction)
+        found, forces, z = corrected
+        found = self._freed(forces, z, correction) or found
         return self._with_status(found, *contact.statuses(forces, z))
 
-    def _refuse_unheld(self, forces: np.ndarray, at_work: float) -> None:
-        """Raise SolveError where friction alone would hold a body, and nothing presses."""
-        if forces[: self._contact.m].max(initial=0.0) > AT_REST * at_work:
-            return
-        if moves := self.problem.free_motion(self.problem.constraints.closable):
-            raise SolveError(f"{moves} {_UNHELD}")
+    def _is_nothing(self, forces: np.ndarray, at_work: float) -> bool:
+        """Whether nothing presses."""
+        return bool(forces[: self._contact.m].max(initial=0.0) <= AT_REST * at_work)
+
+    def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
+        """Equilibrium in which nothing presses, so that nothing rubs.
+
+        Raises SolveError where there is none.
+        A body that its loads have left may be in many places: this one touches another body.
+        """
+        base = self.problem.constraints
+        try:
+            found = self.problem.solve(self.step, self.closed, correction=correction)
+        except SolveError:
+            raise SolveError(self._why_none()) from None
+        pressed = base.covered * np.maximum(found.pressure - found.trial.pressure_limit, 0.0)
+        if not self._is_nothing(pressed[base.eligible], at_work):
+            raise SolveError(self._why_none())
+        none = np.zeros_like(found.pressure)
+        trial = replace(found.trial, pressure=none, gap=found.gap - self.jump)
+        closed = found.status.closed[base.eligible][: self._contact.m]
+        slipping = closed[self._contact.of]
+        return self._with_status(replace(found, trial=trial), closed, slipping)
 
     def _corrected(
         self, z: np.ndarray, scale: float, correction: np.ndarray | float
-    ) -> tuple[Equilibrium, np.ndarray, np.ndarray]:
+    ) -> tuple[Equilibrium, np.ndarray, np.ndarray] | None:
         """Equilibrium with jumps from z (r,) on that fulfil the law, its forces (r,) and z (r,).
 
-        `scale`: of the forces that would close everything, or that are at work.
+        None where they do not come to fulfil it. `scale`: of the forces that would close
+        everything, or that are at work.
         """
         base, last = self.problem.constraints, np.inf
         for _ in range(_CORRECTIONS):
@@ -99,10 +117,10 @@ class Search:
                 break
             if fault > _TOLERATED and (anew := self._contact.again(forces, z)) is not None:
                 following = anew
+            if not np.isfinite(following).all():  # no step leads on from here
+                break
             z, last = following, fault
-        if fault > _TOLERATED:
-            raise SolveError(self._why_none())
-        return found, forces, z
+        return None if fault > _TOLERATED else (found, forces, z)
 
     def _freed(
         self, forces: np.ndarray, z: np.ndarray, correction: np.ndarray | float

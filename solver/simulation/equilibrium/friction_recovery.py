@@ -15,6 +15,7 @@ from scipy import sparse
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
+from ...lac.friction import of_tractions
 from ...lac.recovery import settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
@@ -52,15 +53,19 @@ class _Loads:
 
     def tractions(self, values: np.ndarray) -> list[np.ndarray]:
         """The coefficients (m · k,) of q* by tangent, for pressures and tractions of all rows."""
+        if not self.zone.slips:
+            return []
         c = self.fit.coefficients(values).reshape(len(self.sticks), -1)
-        along = [(slide[:, None] * c).ravel() for slide in self.slide.T]
-        pairs = zip(along, self.zone.slips, strict=True)
-        return [sliding + self._stuck @ values[rows] for sliding, rows in pairs]
+        sliding = [(slide[:, None] * c).ravel() for slide in self.slide.T]
+        stuck = self._stuck @ np.concatenate([values[rows] for rows in self.zone.slips])
+        pairs = zip(sliding, np.split(stuck, len(sliding)), strict=True)
+        return [one + other for one, other in pairs]
 
     @cached_property
     def _stuck(self) -> sparse.csr_matrix:
-        """The reconstruction among macro-elements that stick."""
-        return self.fit.recovery.reconstruction(self.sticks).matrix
+        """The reconstruction among macro-elements that stick, of tractions by tangent."""
+        recovery = self.fit.recovery
+        return of_tractions(recovery.reconstruction(self.sticks).matrix, recovery.moments.normal)
 
     def couple(self, values: np.ndarray) -> np.ndarray:
         """The couple (3,) of q* − q where the surfaces are meshed apart."""

@@ -74,6 +74,9 @@ class ContactProblem:
         surface = np.diff(self.constraints.gaps.tocsc().indptr) > 0
         loose = unsupported(motions, self._motions.supports)
         self.at_rest = Displacement.zero(loose, surface, scene.options.safeguards.remainder)
+        # How contact gives way depends on what is closed: of several states it is the one that is
+        # found from all closed.
+        self._gives_way = any(zone.zone.gives_way for zone in scene.zones)
         self.unsupported = loose
         if (resisting := scene.resisting).shape[0]:
             self.unsupported = unsupported(motions, self._motions.supports, resisting)
@@ -91,8 +94,7 @@ class ContactProblem:
             release()
         self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
-        gives_way = any(zone.zone.gives_way for zone in scene.zones)
-        soft = partial(compliance_of, scene, self.constraints.normal) if gives_way else None
+        soft = partial(compliance_of, scene, self.constraints.normal) if self._gives_way else None
         self._systems_of = partial(
             Systems,
             constraints=on_free,
@@ -143,7 +145,7 @@ class ContactProblem:
             return self.equilibrium(step, eligible, correction)
         guess: Callable[[], np.ndarray] | None
         guess = partial(first_guess, scene, self.constraints, step, self.free_motion)
-        if not scene.options.shortcuts.status:
+        if self._gives_way or not scene.options.shortcuts.status:
             start = eligible
         elif start is None:
             start, guess = guess(), None

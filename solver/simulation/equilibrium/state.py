@@ -292,6 +292,7 @@ def judged(
     unbalanced = np.abs(scene.free.spread(left))
     forces, known = np.repeat(rounded.forces, dim), rounded.gaps
     moving, limit = constraints.moving, np.zeros(len(pressure))
+    of_others = np.full_like(forces, AT_REST * _at_rest(iterate))
     for zone in scene.zones:
         mine = zone.numbers
         places = constraints.gaps[mine].indices
@@ -304,7 +305,7 @@ def judged(
             acting = moving[rows][there]
             error = pressure_of_forces(acting, noise)
             error += pressure_of_gaps(acting, known[rows][there], diagonal)
-            limit[rows] = _NOISE * scale + _ERRORS * error
+            limit[rows] = _NOISE * scale + _ERRORS * error + pressure_of_forces(acting, of_others)
     motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
     covered = np.where(constraints.eligible, constraints.covered, np.inf)
     return Trial(

@@ -75,7 +75,7 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     smallest = float(zone.area.min()) ** (1 / (dim - 1))
     error = round_off * young * float(np.abs(moved).max()) / smallest
     error += max(solution.quality.accuracy.values(), default=0.0) * largest
-    error += round_off * solution.scalars.load_scale
+    error += round_off * solution.largest_pressure
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"

@@ -19,7 +19,7 @@ from ...lac.threads import prefetch
 from ...mechanics.fem.stress import largest_strain
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
-from ..equilibrium.state import Equilibrium
+from ..equilibrium.state import AT_REST, Equilibrium, forces_at_work
 from ..results.records import Validity
 from ..results.solution import Line
 from ..scene.scene import Scene, ZoneScene
@@ -175,10 +175,13 @@ def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity
 
 
 def _at_rest(problem: ContactProblem, state: Equilibrium) -> bool:
-    """Whether the loads of other steps are taken away, and contact presses by round-off of them."""
+    """Whether contact presses by round-off alone, as where the loads of other steps are gone."""
     pressed = (problem.constraints.covered * state.pressure).max(initial=0.0)
     acting = max(float(np.abs(state.force).max()), pressed)
-    return bool(acting < _PRESSED * problem.scene.loads.at_work.force)
+    could = forces_at_work(problem.scene, state.displacement)
+    return bool(
+        acting < _PRESSED * problem.scene.loads.at_work.force or 0 < acting < AT_REST * could
+    )
 
 
 def _apart(scene: Scene) -> np.ndarray:

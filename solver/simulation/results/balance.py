@@ -25,11 +25,11 @@ _ROUND_OFF, _OWN = 1e-10, 1e-2
 def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
     """Relative imbalances by name.
 
-    Forces are divided by the sum of the sizes of the nodal forces at work (loads, or contact forces
-    where there is no load, and at least the force that the displacement could cause, and the loads
-    of other steps), moments by that times the length of the model. Of axisymmetric bodies only
-    forces along the axis have a resultant. Friction between surfaces that are meshed apart is a
-    couple, which is no imbalance.
+    Forces are divided by the sum of the sizes of the nodal forces at work (of loads, contact or
+    supports; where there is no load at least the force that the displacement could cause, and the
+    loads of other steps), moments by that times the length of the model. Of axisymmetric bodies
+    only forces along the axis have a resultant. Friction between surfaces that are meshed apart is
+    a couple, which is no imbalance.
     """
     points, around = scene.points, scene.case.axisymmetric
     contact = np.zeros_like(points)
@@ -39,20 +39,20 @@ def imbalances(scene: Scene, state: Equilibrium) -> dict[str, float]:
         apart = zone.operator.levers is not None
         by_zone[zone.zone.name] = forces, zone.couple(state.pressure) if apart else np.zeros(3)
         contact += forces
-    scale = max(np.abs(state.force).sum(), np.abs(contact).sum() / 2)
+    total = contact + state.correction
+    held, free_part = _unbalanced(scene, state, total)
+    scale = max(np.abs(state.force).sum(), *(np.abs(each).sum() / 2 for each in (contact, held)))
     if not state.force.any():
         caused = force_at_rest(scene, state.displacement)
         scale = max(scale, caused, scene.loads.at_work.total) or 1.0
     result: dict[str, float] = {}
     if state.correction.any():
         by_zone["correction of the pressure"] = state.correction, state.couple
-        contact += state.correction
     for name, (forces, own) in by_zone.items():
         result |= _both(
             f"zone {name}", points, forces, own, scale, scene.coordinates.length, around
         )
     couple = sum((each for _, each in by_zone.values()), np.zeros(3))
-    held, free_part = _unbalanced(scene, state, contact)
     whole = held + state.force + _of_ground(state)
     result |= _both(
         "reactions and loads", points, whole, -couple, scale, scene.coordinates.length, around

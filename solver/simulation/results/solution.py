@@ -287,6 +287,13 @@ class Solution:
         return nodes
 
     @property
+    def largest_pressure(self) -> float:
+        """The largest pressure of any step, of loads or contact: where nothing acts, the scale."""
+        found = [one.pressure for step in self.steps for one in step.resultants.values()]
+        of_contact = (float(each.max()) for each in found if each is not None)
+        return max(self.scalars.load_scale, *of_contact, 0.0)
+
+    @property
     def largest_displacement(self) -> tuple[float, np.ndarray]:
         """The length of the largest displacement of deformable bodies, and its place (dim,)."""
         size = np.linalg.norm(self.displacement, axis=1) * self.deformable

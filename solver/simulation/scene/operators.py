@@ -31,8 +31,9 @@ from ..options import Options
 from .attributes import Attributes
 from .cut_groups import CutZone
 
-# Half of the largest angle between neighbouring faces of a master whose normals contact follows.
-_SMOOTH = np.radians(30)
+# Half of the largest angle between neighbouring faces of a master whose normals contact follows:
+# those of a hexagon, whatever the rounding.
+_SMOOTH = np.radians(30) + 1e-9
 
 
 def operator_of(

@@ -1,0 +1,30 @@
+"""Solve random cases in several views, COUNT of them from the seed START on: `make views`."""
+
+import sys
+import time
+from collections import Counter
+
+import yaml
+
+from .cases import drawn
+from .judge import compared
+
+
+def main(count: int, start: int) -> int:
+    """The cases whose views differ, printed as YAML; 1 where there are any."""
+    started, words, wrong = time.monotonic(), Counter[str](), 0
+    for seed in range(start, start + count):
+        case = drawn(seed)
+        word, found = compared(case)
+        words[word] += 1
+        if found:
+            wrong += 1
+            print(f"seed {seed}: {'; '.join(found)}")
+            print(yaml.safe_dump(case, sort_keys=False), flush=True)
+    said = ", ".join(f"{number} {word}" for word, number in words.most_common())
+    print(f"{count} cases, {wrong} differ, {time.monotonic() - started:.0f} s: {said}")
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, sys.argv[1:3])))

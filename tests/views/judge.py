@@ -1,0 +1,133 @@
+"""One case in several views, and what differs between them."""
+
+import signal
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from random import Random
+from types import FrameType
+
+import numpy as np
+
+from solver import Solved, solve_case
+from solver.lac.errors import SolveError
+from solver.system.errors import InputError
+
+from .cases import Case
+
+# Stresses in other units are so many times as large.
+UNITS = 1e6
+# Pressures and tractions are the same up to this share of the largest pressure of all steps, or so
+# many times what the solve itself says that rounding may change.
+SAME, ROUNDINGS = 1e-8, 10.0
+# A solve takes less than a second.
+MOST_SECONDS = 60
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What came of a view: a word, its reason, and the pressures and tractions (m,) in order.
+
+    `size`: the largest pressure of all steps; `rounding`: its estimated relative error.
+    """
+
+    word: str
+    reason: str
+    pressure: np.ndarray
+    traction: np.ndarray
+    size: float
+    rounding: float
+
+
+def views(case: Case) -> Iterator[tuple[str, Case, bool]]:
+    """The other views of a case: name, mapping, whether all work is done that may be left out."""
+    yield "everything", case, True
+    yield "other units", in_other_units(case), False
+    renumbered = deepcopy(case)
+    renumbered.setdefault("transform", {})["renumber"] = 7
+    yield "renumbered", renumbered, False
+    along = any(key in str(case) for key in ("body_force", "traction", "bodies"))
+    if not along and case.get("plane") != "axisymmetric":  # what has directions along the axes
+        yield "turned", turned(case), False
+
+
+def turned(case: Case) -> Case:
+    """The mesh turned by an angle of its own; supports and loads are along normals."""
+    r, dim, found = Random(case["name"]), len(case["mesh"]["bottom"]["divisions"]), deepcopy(case)
+    angle = r.uniform(10.0, 350.0)
+    axis = [r.uniform(-1.0, 1.0) for _ in range(3)]
+    turn = angle if dim == 2 else {"axis": axis, "angle": angle}
+    found.setdefault("transform", {})["rotate"] = turn
+    return found
+
+
+def in_other_units(case: Case) -> Case:
+    """The case with all stresses, forces and stiffnesses in a smaller unit."""
+    found = deepcopy(case)
+    for material in found["materials"].values():
+        material["young"] *= UNITS
+    for load in found["loads"]:
+        if "pressure" in load:
+            load["pressure"] *= UNITS
+        for key in {"traction", "body_force"} & load.keys():
+            load[key] = [UNITS * value for value in load[key]]
+    for support in found["supports"]:
+        if "spring" in support:
+            support["spring"] = {k: UNITS * value for k, value in support["spring"].items()}
+    return found
+
+
+def seen(case: Case, everything: bool = False, unit: float = 1.0) -> Seen:
+    """Solve a case; only a traceback is no answer, or no end in a minute."""
+    none = np.zeros(0)
+    before = signal.signal(signal.SIGALRM, _too_long)
+    signal.alarm(MOST_SECONDS)
+    try:
+        solved = solve_case(case, everything=everything)
+    except InputError as error:
+        return Seen("refused", str(error), none, none, 1.0, 0.0)
+    except SolveError as error:
+        return Seen("no solution", str(error), none, none, 1.0, 0.0)
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+    causes = solved.solution.quality.accuracy.values()
+    values = solved.pressure / unit, _tractions(solved) / unit
+    size = max(solved.solution.largest_pressure / unit, np.finfo(float).tiny)
+    return Seen(solved.verdict, solved.reason, *values, size, max(causes, default=0.0))
+
+
+def _too_long(_: int, __: FrameType | None) -> None:
+    raise TimeoutError(f"no end after {MOST_SECONDS} s")
+
+
+def _tractions(solved: Solved) -> np.ndarray:
+    """The sizes (m,) of the tractions of friction on all macro-elements."""
+    zones = solved.solution.zones
+    found = (
+        z.friction.friction_traction if z.friction else np.zeros((len(z.area), 1)) for z in zones
+    )
+    return np.concatenate([np.zeros(0), *(np.linalg.norm(each, axis=1) for each in found)])
+
+
+def compared(case: Case) -> tuple[str, list[str]]:
+    """The word of a case, and what differs between its views; empty where nothing does."""
+    first, found = seen(case), list[str]()
+    for name, other, everything in views(case) if first.word != "refused" else ():
+        again = seen(other, everything, UNITS if name == "other units" else 1.0)
+        found += [f"{name}: {what}" for what in _between(first, again, name)]
+    return first.word, found
+
+
+def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
+    if one.word != other.word:
+        yield f"{one.word} ({one.reason}) and {other.word} ({other.reason})"
+        return
+    allowed = max(SAME, ROUNDINGS * max(one.rounding, other.rounding))
+    for quantity in ("pressure", "traction"):
+        a, b = (getattr(each, quantity) for each in (one, other))
+        if view == "renumbered":
+            a, b = np.sort(a), np.sort(b)
+        apart = float(np.abs(a - b).max(initial=0.0)) / one.size
+        if apart > allowed:
+            yield f"{quantity} by {apart:.1e}"
