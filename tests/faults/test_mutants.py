@@ -7,6 +7,7 @@ import pytest
 from tests.faults.mutants import MUTANTS
 from tests.faults.planted import checks, planted, reason, verdict
 from tests.pairs.faults import FAULTS
+from tests.views.test_views import PLANTED
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "design" / "faults.md"
 
@@ -40,6 +41,8 @@ def test_the_page_lists_them_all():
         f"| `{fault.name}` | {fault.what} | {'; '.join(map(': '.join, fault.options.items()))} |"
         for fault in FAULTS
     ]
-    assert listed == rows + meeting
+    seen = [line for line in listed if line.split("`")[1] in PLANTED]
+    assert listed == rows + meeting + seen
+    assert len(seen) == len(PLANTED)
     assert len({m.name for m in (*MUTANTS, *FAULTS)}) == len(rows + meeting)
     assert f"It catches {len(rows)} of {len(rows)} faults." in PAGE.read_text(encoding="utf-8")

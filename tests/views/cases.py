@@ -41,7 +41,13 @@ def drawn(seed: int) -> Case:
         pushed = {"group": "press", "fix": {"normal": -r.uniform(1e-4, 1e-2)}}
         case["supports"].append(pushed)
     case["loads"] = case.get("loads", []) + list(_more_loads(r, dim, around, pressure))
+    if not around and r.random() < 0.15:
+        _rigid(r, dim, case)
+    elif not around and r.random() < 0.1:
+        case["supports"].append({"group": "press", "together": ["xyz"[dim - 1]]})
     case["steps"] = r.choice(STEPS)
+    if case["loads"] and r.random() < 0.2:
+        _by_names(r, case)
     if r.random() < 0.15:
         case["motion"] = "large"
     if r.random() < 0.3:
@@ -113,6 +119,36 @@ def _on_floor(r: Random, dim: int, height: float, case: Case) -> None:
     zone = {"name": "below", "slave": "base", "master": "floor"}
     zone |= {"friction": r.choice((0.0, 0.1, 0.5)), "recovery": r.choice(("none", "linear"))}
     case["contact"].append(zone)
+
+
+def _rigid(r: Random, dim: int, case: Case) -> None:
+    """Make a body rigid: the lower one held, or the upper one pushed or moved."""
+    down, side = "xyz"[dim - 1], r.choice(("bottom", "top"))
+    other = "top" if side == "bottom" else "bottom"
+    planes = [[float(i == k) for i in range(dim)] for k in range(dim - 1)]
+    case["groups"] = {
+        f"side{k}": {"of": "faces", "within": other, "plane": {"point": [0.0] * dim, "normal": n}}
+        for k, n in enumerate(planes)
+    }
+    held: list[Case] = [{"group": group, "fix": ["normal"]} for group in case["groups"]]
+    load = 0.01 * min(material["young"] for material in case["materials"].values())
+    if side == "bottom":
+        case["bodies"] = {"bottom": {"rigid": True}}
+        case["loads"] = [{"group": "press", "pressure": load * r.random()}]
+    else:
+        moved = r.choice(({"force": {down: -load * r.random()}}, {"move": {down: -1e-3}}))
+        case["bodies"] = {"top": {"rigid": True} | moved}
+        case["loads"], held = [], [*held, {"group": "base", "fix": ["normal"]}]
+    case["supports"], case["contact"] = held, case["contact"][:1]
+    case["contact"][0] |= {"slave": f"{other}_contact", "master": f"{side}_contact"}
+
+
+def _by_names(r: Random, case: Case) -> None:
+    """Loads that follow each other, and leave each other."""
+    names = [f"load{number}" for number in range(len(case["loads"]))]
+    case["loads"] = [x | {"name": name} for x, name in zip(case["loads"], names, strict=True)]
+    path = [{name: float(r.choice((0.0, 0.5, 1.0))) for name in names} for _ in range(2)]
+    case["steps"] = [dict.fromkeys(names, 1.0), *path]
 
 
 def _more_loads(r: Random, dim: int, around: bool, pressure: float) -> list[Case]:

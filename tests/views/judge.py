@@ -46,7 +46,7 @@ def views(case: Case) -> Iterator[tuple[str, Case, bool]]:
     renumbered = deepcopy(case)
     renumbered.setdefault("transform", {})["renumber"] = 7
     yield "renumbered", renumbered, False
-    along = any(key in str(case) for key in ("body_force", "traction", "bodies"))
+    along = any(key in str(case) for key in ("body_force", "traction", "bodies", "together"))
     if not along and case.get("plane") != "axisymmetric":  # what has directions along the axes
         yield "turned", turned(case), False
 
@@ -74,6 +74,9 @@ def in_other_units(case: Case) -> Case:
     for support in found["supports"]:
         if "spring" in support:
             support["spring"] = {k: UNITS * value for k, value in support["spring"].items()}
+    for body in found.get("bodies", {}).values():
+        if "force" in body:
+            body["force"] = {axis: UNITS * value for axis, value in body["force"].items()}
     return found
 
 
