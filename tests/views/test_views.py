@@ -19,6 +19,8 @@ from .cases import drawn
 from .judge import compared
 
 FOUND = yaml.safe_load((Path(__file__).parent / "found.yaml").read_text())
+# Facets of curved contact change their pressure by more than a tenth.
+FACETED = ("frames", "smooth")
 # Each solves in a fraction of a second, in four or five views.
 DRAWN = range(100, 124)
 
@@ -27,7 +29,7 @@ DRAWN = range(100, 124)
 def test_a_view_that_differed_once_is_the_same_now(name):
     word, differences = compared(FOUND[name])
     assert not differences
-    assert word in ("solved", "unreliable")
+    assert word == ("unreliable" if name in FACETED else "solved")
 
 
 @pytest.mark.parametrize("seed", DRAWN)

@@ -241,11 +241,12 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    if max(errors.values()) >= scale and _at_rest(iterate):
-        # The pressure is rounding: no force acts. The measure is what strains and motions would be.
-        of_others = np.full_like(noise, scene.loads.at_work.force)
-        caused = stress_at_rest(scene, moved), pressure_of_forces(moving, of_others)
-        scale = max(scale, iterate.sizes.highest, *caused)
+    of_others = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
+    at_rest = _at_rest(iterate) or scale <= AT_REST * of_others
+    if max(errors.values()) >= scale and at_rest:
+        # The pressure is rounding: nothing presses. The measure is what strains and motions would
+        # be.
+        scale = max(scale, iterate.sizes.highest, stress_at_rest(scene, moved), of_others)
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
