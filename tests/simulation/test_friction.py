@@ -176,31 +176,6 @@ def test_a_stiff_slave_is_unreliable_by_rounding_and_no_failure():
     assert found.pressure.mean() == pytest.approx(0.011686579637947, rel=1e-6)
 
 
-@pytest.mark.parametrize("axis", [[0.0, 0.0, 1.0], [1.0, 2.0, -0.5]])
-def test_on_curved_faces_in_space_nothing_depends_on_the_axes(axis):
-    """Turned, mirrored and renumbered, a stepped path over an arc has the same pressures."""
-    blocks = {"bottom": ("PENTA15", [2, 2, 2]), "top": ("TETRA10", [1, 1, 1])}
-    recipe = {k: {"cells": c, "divisions": d} for k, (c, d) in blocks.items()}
-    case = {
-        "name": "arc",
-        "mesh": {"recipe": "wavy", **recipe, "shape": "arc", "height": -0.18},
-        "transform": {"perturb": {"amplitude": 0.15, "seed": 69}},
-        "materials": {
-            "bottom": {"young": 1292, "poisson": 0.06},
-            "top": {"young": 241, "poisson": 0.3},
-        },
-        "supports": [{"group": g, "fix": ["normal"]} for g in ("symx", "base", "symy")]
-        + [{"group": "press", "fix": {"normal": -0.017}}],
-        "loads": [{"group": "farx", "pressure": 5.0}],
-        "contact": [{"slave": "bottom_contact", "master": "top_contact", "friction": 1.0}],
-    }
-    case["mesh"]["bottom"]["contact"] = "TRIA6"
-    plain = solve_case(case).pressure
-    turned = {"rotate": {"axis": axis, "angle": 40.0}, "renumber": 5}
-    found = solve_case(case | {"transform": case["transform"] | turned}).pressure
-    assert np.sort(found) == pytest.approx(np.sort(plain), rel=1e-10)
-
-
 def test_recovery_raises_the_order_of_friction():
     """Sliding waves: constants have order 2, a recovered pressure and its friction more than 3."""
     found = {}
