@@ -73,7 +73,7 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     young = max(material.young for material in solution.case.materials.values())
     dim = 3 if solution.case.axisymmetric else moved.shape[1]
     smallest = float(zone.area.min()) ** (1 / (dim - 1))
-    error = round_off * young * float(np.abs(moved).max()) / smallest
+    error = round_off * young * float(np.abs(solution.displacement).max()) / smallest
     error += max(solution.quality.accuracy.values(), default=0.0) * largest
     error += round_off * solution.largest_pressure
     worst = float(contact.multiplier.min(initial=0.0))
