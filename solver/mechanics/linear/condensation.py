@@ -33,9 +33,10 @@ ROUND_OFF = 8 * np.finfo(float).eps
 _CONVERGED = 1e-8
 # A refinement aims at this share of round-off, and at no smaller a gain.
 _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
-# A macro-element's own coefficient must not be smaller than this share of its row's largest: the
-# condensed matrix loses twice as many digits.
-_SMALLEST_PIVOT = 1e-2
+# A macro-element's own coefficient must not be a smaller share of its row's largest than the second
+# one; smaller than the first only where no other is left, as the condensed matrix loses twice as
+# many digits.
+_GOOD_PIVOT, _SMALLEST_PIVOT = 1e-2, 1e-6
 # Zones whose slave surface is a master surface, one after another.
 _LAYERS = 4
 _NO_SPRINGS = np.empty(0)
@@ -139,23 +140,26 @@ def choose_pivots(constraints: sparse.csr_matrix, own: np.ndarray) -> tuple[np.n
     columns, size = constraints.indices, np.abs(constraints.data)
     largest = np.zeros(m)
     np.maximum.at(largest, rows, size)
-    for _ in range(_LAYERS):
+    least = _GOOD_PIVOT
+    for _ in range(2 * _LAYERS):
         seen = np.bincount(columns, minlength=n)
         usable = np.flatnonzero(own[columns] & (seen[columns] == 1))
         # Sorted by row, then size: the last of each row is its largest.
         order = usable[np.lexsort((size[usable], rows[usable]))]
         best = order[np.flatnonzero(np.diff(rows[order], append=m + 1))]
-        best = best[size[best] > _SMALLEST_PIVOT * largest[rows[best]]]
+        best = best[size[best] > least * largest[rows[best]]]
         found[rows[best]], pivot[rows[best]] = True, columns[best]
-        if found.all() or not len(best):
+        if found.all() or (not len(best) and least == _SMALLEST_PIVOT):
             break
+        if not len(best):
+            least = _SMALLEST_PIVOT
         left = ~found[rows]
         rows, columns, size = rows[left], columns[left], size[left]
     return pivot, found
 
 
 def inverse_of(pivots: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The inverse of the columns (m, m) of `choose_pivots`: D (1 + N) with Nᵏ = 0, k ≤ _LAYERS."""
+    """The inverse of the columns (m, m) of `choose_pivots`: D (1 + N) with Nᵏ = 0."""
     diagonal = pivots.diagonal()
     beside = (pivots - sparse.diags(diagonal)).tocsr()
     beside.eliminate_zeros()
