@@ -10,6 +10,7 @@ from solver.lac.facets import facets, with_nodal_normals
 from solver.lac.multipliers import shape_integrals
 from solver.lac.operator import LAC, _reaches, gap_operator
 from solver.lac.pairing import candidate_pairs
+from solver.lac.partners import sampled
 from tests.patches import segment_pair, square_pair
 
 
@@ -182,3 +183,11 @@ def test_nodal_normals_keep_forces_and_moments_in_balance(rise):
     for motion in (np.tile([1.0, 0.0], 5), np.tile([0.0, 1.0], 5), rotation.ravel()):
         assert operator.matrix @ motion == pytest.approx(np.zeros(2), abs=1e-14)
     assert operator.closed_faces == 0
+
+
+def test_on_the_axis_a_face_has_a_normal_but_no_area():
+    points = np.array([[2.0, 1.0], [0.0, 1.0]])
+    edge = facets(points, BY_NAME["SEG2"], np.array([[0, 1]]), np.array([0]), axisymmetric=True)
+    sample = sampled(edge, (np.array([[0.0], [0.5], [1.0]]), np.ones(3)))
+    assert sample.normal[0] == pytest.approx(np.tile([0.0, 1.0], (3, 1)))
+    assert sample.weight[0] == pytest.approx([8 * np.pi, 4 * np.pi, 0.0])

@@ -190,7 +190,7 @@ EXCLUDED = (
     Rule(
         {
             "treatment": ("nodal",),
-            "slave cells": ("HEXA8",),
+            "slave cells": ("HEXA8", "PYRA5"),
             "form": ("exchanged",),
             "materials": ("stiff master",),
         },

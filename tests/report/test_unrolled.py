@@ -36,6 +36,13 @@ def test_a_cylinder_is_unrolled(sign):
     assert flat.profile_name == "angle around z from the middle of the contact, degrees"
 
 
+def test_two_faces_tell_their_axis_too():
+    points, out = around_z([45])
+    out[1] = [np.cos(np.radians(135)), np.sin(np.radians(135)), 0.0]
+    points[1] = 2.0 * out[1] + [10.0, 5.0, 3.0]
+    assert laid_flat(zone(points, out)).names == ("arc around z", "z")
+
+
 def test_only_what_is_pressed_counts_for_the_middle():
     points, out = around_z([0, 45, 90, 180])
     flat = laid_flat(zone(points, out, np.repeat([0.0, 1.0, 1.0, 0.0], 2)))

@@ -12,7 +12,7 @@ from solver.case.model import CaseReference
 from solver.case.reader import load_case, parse_case
 from solver.lac.errors import SolveError
 from solver.mesh import generate
-from solver.simulation.motion import _joined
+from solver.simulation.motion import _joined, _position
 from solver.simulation.options import LEAN
 from solver.simulation.simulate import simulate, solved
 from solver.system.errors import InputError
@@ -332,6 +332,13 @@ def test_a_wrong_pressure_at_an_earlier_position_is_noticed():
     checks = {check.name: check for check in run_checks(solution)}
     assert not checks["position_pressure"].passed
     assert "step 3" in checks["position_pressure"].where
+
+
+def test_a_recovered_pressure_of_the_last_step_alone_is_nan_before():
+    solution = run(load_case(CASES / "motion/slide-c-friction.yaml"))
+    points = {"recovered_pressure": np.zeros(3)}
+    position = _position(solution, (points, {}))
+    assert np.isnan(position.at_points["recovered_pressure"]).all()
 
 
 def test_the_slip_of_all_steps_turns_with_the_slave():
