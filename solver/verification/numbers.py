@@ -21,7 +21,7 @@ from .samples import Reference, Sample, Sampler, by_component
 # Where the pressures of the last step are below this share of the largest of all steps, or of the
 # stress that the displacement could cause, the law is judged by that share: forces are rounded on
 # their scale. Slips as well.
-_LITTLE, _LITTLE_OF_MOTION = 1e-3, 1e-6
+_LITTLE, _LITTLE_OF_MOTION = 0.1, 1e-6
 # Of the model's length: a way below it is none.
 _NO_WAY = 1e-10
 
