@@ -55,6 +55,7 @@ class SolvedAs(NamedTuple):
 
 
 AS_WRITTEN = SolvedAs()
+"""As the file of a case says."""
 
 
 @dataclass(frozen=True)

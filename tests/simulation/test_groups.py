@@ -152,6 +152,21 @@ def test_a_load_on_a_rigid_body_would_vanish(load, lost):
         check_groups(case, mesh)
 
 
+@pytest.mark.parametrize("side", ["slave", "master"])
+def test_a_rigid_side_is_the_master(side):
+    """Named as slave, or to be exchanged with it."""
+    line = "  - {name: a, slave: bottom_contact, master: top_contact}\n"
+    other = "master" if side == "slave" else "slave"
+    text = RIGID.replace(line, f"  - {{{side}: top_contact, {other}: bottom_contact}}\n")
+    text += f"directions: {'first' if side == 'slave' else 'both'}\n"
+    so = "" if side == "slave" else ", so directions must be `first`"
+    said = (
+        f"{side} = 'top_contact': lies on the rigid body upper; a rigid side is always the master"
+    )
+    with pytest.raises(InputError, match=f"{said}{so}$"):
+        check_groups(parse_case(text, PATH), two_squares())
+
+
 SOLID = """\
 name: one
 mesh: {file: one.msh}
