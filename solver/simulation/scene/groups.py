@@ -312,16 +312,14 @@ class _Groups:
                 "bodies in contact share no nodes"
             )
             raise self.error(keys["master"], zone.master, allowed)
-        self.check_deformable(keys["slave"], zone.slave, parts["slave"])
-        if self.case.about.directions == "both":
-            either = ", so directions must be `first`"
-            self.check_deformable(keys["master"], zone.master, parts["master"], either)
+        for side in ("slave", "master") if self.case.about.directions == "both" else ("slave",):
+            self.check_deformable(keys[side], getattr(zone, side), parts[side])
 
-    def check_deformable(
-        self, key: str, group: str, parts: list[np.ndarray], why: str = ""
-    ) -> None:
+    def check_deformable(self, key: str, group: str, parts: list[np.ndarray]) -> None:
         for rigid in self.case.rigid:
             body = self.cells(f"bodies.{rigid}", rigid, self.dim)
             if np.isin(self.nodes(parts), self.nodes(body)).any():
                 allowed = f"lies on the rigid body {rigid}; a rigid side is always the master"
-                raise self.error(key, group, f"{allowed}{why}")
+                if key.endswith("master"):  # in the file: slave where it is exchanged
+                    allowed += ", so directions must be `first`"
+                raise self.error(key, group, allowed)
