@@ -177,7 +177,8 @@ class Case:
     @property
     def states(self) -> "dict[str, ExactSolution]":
         """The states of an exact solution that has one for each step, by the name of the step."""
-        states = self.reference.exact.states if self.reference.exact else ()
+        exact = self.reference.exact
+        states = exact.states if exact else ()
         return dict(zip(self.histories, states, strict=True)) if states else {}
 
     def exact_in(self, step: Step) -> "ExactSolution | None":
@@ -185,15 +186,17 @@ class Case:
 
         The one of `reference` is that of the last step.
         """
-        if self.reference.exact is None or not self.moving:
-            return self.reference.exact
-        return self.reference.exact.moved(self._way(step) - self._way(self.steps[-1]))
+        exact = self.reference.exact
+        if exact is None or not self.moving:
+            return exact
+        return exact.moved(self._way(step) - self._way(self.steps[-1]))
 
     def at_its_end(self) -> "Case":
         """With the exact solution of the last step in the place of that on the mesh as given."""
-        if self.reference.exact is None or not self.moving:
+        exact = self.reference.exact
+        if exact is None or not self.moving:
             return self
-        return self.with_exact(self.reference.exact.moved(self._way(self.steps[-1])))
+        return self.with_exact(exact.moved(self._way(self.steps[-1])))
 
     def with_exact(self, exact: "ExactSolution | None") -> "Case":
         """The case with another exact solution."""

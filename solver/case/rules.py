@@ -149,19 +149,21 @@ def _in_probes(case: Case) -> Iterator[Fault]:
 
 def _in_errors(case: Case) -> Iterator[Fault]:
     """An error against an exact solution can have a tolerance only where there is such a one."""
-    for error in case.reference.tolerance.keys() & ERRORS.keys():
-        key, value = f"tolerance.{error}", case.reference.tolerance[error]
-        if case.reference.exact is None:
+    reference = case.reference
+    for error in reference.tolerance.keys() & ERRORS.keys():
+        key, value = f"tolerance.{error}", reference.tolerance[error]
+        if reference.exact is None:
             yield key, value, "needs an exact solution: reference.solution names none"
-        elif BY_NAME[error].needs not in case.reference.exact.quantities:
-            yield key, value, f"{case.reference.exact.name} has no {BY_NAME[error].needs}"
+        elif BY_NAME[error].needs not in reference.exact.quantities:
+            yield key, value, f"{reference.exact.name} has no {BY_NAME[error].needs}"
 
 
 def _in_works(case: Case) -> Iterator[Fault]:
     """The work of friction is known in each step."""
-    given = case.reference.values.get("dissipation")
-    exact = given is EXACT and case.reference.exact is not None
-    works = case.reference.exact.dissipation if exact and case.reference.exact else given
+    reference = case.reference
+    given = reference.values.get("dissipation")
+    exact = given is EXACT and reference.exact is not None
+    works = reference.exact.dissipation if exact and reference.exact else given
     if isinstance(works, tuple) and len(works) != len(case.steps):
         allowed = f"must have a number for each of the {len(case.steps)} steps"
         more = f"; the solution has {len(works)}" if exact else ""
@@ -170,38 +172,33 @@ def _in_works(case: Case) -> Iterator[Fault]:
 
 def _in_reference(case: Case) -> Iterator[Fault]:
     """Every value of the reference feeds a check; no tolerance admits any result at all."""
-    for check, tolerance in case.reference.tolerance.items():
+    reference = case.reference
+    for check, tolerance in reference.tolerance.items():
         if tolerance >= 1:
             allowed = "must be below 1, the error of a result that is zero"
-            if check in case.reference.expected:
-                yield (
-                    f"expected.{check}",
-                    case.reference.expected[check],
-                    f"{MARGIN} times it {allowed}",
-                )
+            if check in reference.expected:
+                key, error = f"expected.{check}", reference.expected[check]
+                yield key, error, f"{MARGIN} times it {allowed}"
             yield f"tolerance.{check}", tolerance, allowed
-    for key in case.reference.values.keys() & _OF_CONTACT if not case.zones else ():
+    for key in reference.values.keys() & _OF_CONTACT if not case.zones else ():
         allowed = "cannot be compared: the case has no contact"
         yield f"reference.{key}", None, allowed
-    for key in case.reference.values.keys() & _OF_FRICTION if not case.frictional else ():
+    for key in reference.values.keys() & _OF_FRICTION if not case.frictional else ():
         allowed = "cannot be compared: no contact zone has friction"
         yield f"reference.{key}", None, allowed
     yield from _in_works(case)
-    if "coverage" in case.reference.values and "contact_pressure" not in case.reference.values:
+    if "coverage" in reference.values and "contact_pressure" not in reference.values:
         allowed = "needs contact_pressure: it says where that acts"
         yield "reference.coverage", None, allowed
-    if case.reference.kind and not case.reference.values and case.reference.exact is None:
+    if reference.kind and not reference.values and reference.exact is None:
         allowed = "gives no value to compare with, such as contact_pressure"
-        yield "reference.kind", case.reference.kind, allowed
-    if (
-        case.reference.exact
-        and not case.reference.values
-        and not case.reference.tolerance.keys() & ERRORS.keys()
-    ):
-        known = [name for name in ERRORS if BY_NAME[name].needs in case.reference.exact.quantities]
+        yield "reference.kind", reference.kind, allowed
+    compared = reference.values or reference.tolerance.keys() & ERRORS.keys()
+    if reference.exact and not compared:
+        known = [name for name in ERRORS if BY_NAME[name].needs in reference.exact.quantities]
         allowed = "nothing is compared with it; give a value (`contact_pressure: solution`) or a "
         allowed += f"tolerance for one of {', '.join(known)}"
-        yield "reference.solution", case.reference.exact.name, allowed
+        yield "reference.solution", reference.exact.name, allowed
 
 
 def _listed_twice(case: Case) -> Iterator[Fault]:

@@ -26,8 +26,8 @@ from scipy import sparse
 # A macro-element covered by less than a quarter of its area is no neighbour: its mean is of little
 # use to others. Meshes have exact quarters, and kinks of exactly 30°: rounding decides neither.
 MIN_SHARE = 0.25 - 1e-9
-# Neighbours' normals differ by less than 30°: across a kink the pressure may jump.
-_SAME_SIDE = np.cos(np.radians(30)) + 1e-9
+SAME_SIDE = np.cos(np.radians(30)) + 1e-9
+"""Neighbours' normals differ by less than 30°: across a kink the pressure may jump."""
 # Neighbours lie on one side where their mean direction is longer than this; unit vectors to the
 # five neighbours of a square at a border have a mean of 0.48.
 _ONE_SIDE = 0.4
@@ -232,7 +232,7 @@ def _useful(at: Moments, near: sparse.csr_matrix, closed: np.ndarray) -> sparse.
     """Neighbours (m, m) that may serve: closed, well covered, not around a kink, another one."""
     pairs = near.tocoo()
     i, j = pairs.row, pairs.col
-    level = np.einsum("pd,pd->p", at.normal[i], at.normal[j]) > _SAME_SIDE
+    level = np.einsum("pd,pd->p", at.normal[i], at.normal[j]) > SAME_SIDE
     kept = (i != j) & closed[i] & closed[j] & (at.share[j] >= MIN_SHARE) & level
     ones = np.ones(int(kept.sum()), dtype=bool)
     return sparse.csr_matrix((ones, (i[kept], j[kept])), shape=near.shape)

@@ -22,7 +22,7 @@ from .samples import Reference, Sample, Sampler, by_component
 # stress that the displacement could cause, the law is judged by that share: forces are rounded on
 # their scale. Slips as well.
 _LITTLE, _LITTLE_OF_MOTION = 0.1, 1e-6
-# Of the model's length: a way below it is none.
+# Slips shorter than this share of the model's length count as zero.
 _NO_WAY = 1e-10
 
 

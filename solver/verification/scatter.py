@@ -20,7 +20,7 @@ import numpy as np
 
 from ..lac.cells.catalogue import cell_type
 from ..lac.facets import tangents_of
-from ..lac.reconstruction import vertex_neighbours
+from ..lac.reconstruction import SAME_SIDE, vertex_neighbours
 from ..simulation.equilibrium.state import stress_of_motion
 from ..simulation.judgement.validity import allowed_of_pressure
 from ..simulation.results.solution import Solution, ZoneResult
@@ -37,9 +37,6 @@ have 0.22 and more: press fits and loaded rings and spheres of linear faces with
 """
 # Neighbours are nearer than this many sizes of the macro-element along its axes.
 _REACH = 1.3
-# Neighbours' normals differ by less than 30°, in more than rounding: across a kink the pressure may
-# jump.
-_SAME_SIDE = np.cos(np.radians(30)) + 1e-9
 # A fit is determined where the squares of its matrix are above the first share of their number, and
 # is no extrapolation where the mean place of the neighbours is nearer than the second.
 _RANK, _CENTRED = 0.03, 0.3
@@ -173,7 +170,7 @@ def _near(points: np.ndarray, zone: ZoneResult) -> _Near:
     size = np.sqrt(np.maximum(size, np.finfo(float).tiny))
     faces = [(number, nodes[:, : cell_type(name).n_vertices]) for name, nodes, number in zone.faces]
     i, j = vertex_neighbours(faces, count).tocoo().coords
-    level = np.einsum("pd,pd->p", zone.normal[i], zone.normal[j]) > _SAME_SIDE
+    level = np.einsum("pd,pd->p", zone.normal[i], zone.normal[j]) > SAME_SIDE
     i, j = i[level & (i != j)], j[level & (i != j)]
     away = np.einsum("psd,pd->ps", axes[i], zone.centre[j] - zone.centre[i])
     place = away / (_REACH * size[i])

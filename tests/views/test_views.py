@@ -69,7 +69,7 @@ def no_rest(search, _at_work, _correction):
 PLANTED = {
     "frames": (friction_recovery, "of_tractions", frames_apart),
     "columns": (reconstruction, "_scale", by_column),
-    "kink": (reconstruction, "_SAME_SIDE", np.cos(np.radians(30))),
+    "kink": (reconstruction, "SAME_SIDE", np.cos(np.radians(30))),
     "pivots": (condensation, "_GOOD_PIVOT", 1e-6),
     "rest": (Search, "_resting", no_rest),
     "smooth": (CoulombContact, "_from_smooth", lambda _contact, _start: None),

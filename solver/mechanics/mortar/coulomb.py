@@ -327,11 +327,12 @@ class CoulombContact:
             unit[rows, np.arange(count)] = 1.0
             scale = np.where(self.c > 0, self.c, 1.0)[rows]
             matrix = fault(unit, self.stiffness[:, rows]) / scale
-            for springs in (0.0, _WEAK):
+            most = _FREE * np.abs(wanted).max(initial=0.0)
+            for held in (False, True):
+                matrix[np.diag_indices(count)] += _WEAK * held
                 with suppress(np.linalg.LinAlgError):
-                    found = np.linalg.solve(matrix + springs * np.eye(count), wanted)
-                    most = _FREE * np.abs(wanted).max(initial=0.0)
-                    if springs or np.abs(found).max(initial=0.0) <= most:
+                    found = np.linalg.solve(matrix, wanted)
+                    if held or np.abs(found).max(initial=0.0) <= most:
                         return np.asarray(found / scale)
             return np.full(count, np.nan)
 

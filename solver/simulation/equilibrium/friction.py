@@ -82,8 +82,8 @@ class Search:
     def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
         """Equilibrium in which nothing presses, so that nothing rubs.
 
-        Raises SolveError where there is none.
-        A body that its loads have left may be in many places: this one touches another body.
+        A body that its loads have left may be in many places: this one touches another body. Raises
+        SolveError if the search without friction finds no such state.
         """
         base = self.problem.constraints
         try:
@@ -117,8 +117,6 @@ class Search:
                 break
             if fault > _TOLERATED and (anew := self._contact.again(forces, z)) is not None:
                 following = anew
-            if not np.isfinite(following).all():  # no step leads on from here
-                break
             z, last = following, fault
         return None if fault > _TOLERATED else (found, forces, z)
 

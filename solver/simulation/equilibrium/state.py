@@ -241,12 +241,12 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    of_others = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
-    at_rest = _at_rest(iterate) or scale <= AT_REST * of_others
-    if max(errors.values()) >= scale and at_rest:
-        # The pressure is rounding: nothing presses. The measure is what strains and motions would
-        # be.
-        scale = max(scale, iterate.sizes.highest, stress_at_rest(scene, moved), of_others)
+    if max(errors.values()) >= scale:
+        of_others = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
+        if _at_rest(iterate) or scale <= AT_REST * of_others:
+            # The pressure is rounding: nothing presses. The measure is what strains and motions
+            # would be.
+            scale = max(scale, iterate.sizes.highest, stress_at_rest(scene, moved), of_others)
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
@@ -293,20 +293,20 @@ def judged(
     unbalanced = np.abs(scene.free.spread(left))
     forces, known = np.repeat(rounded.forces, dim), rounded.gaps
     moving, limit = constraints.moving, np.zeros(len(pressure))
-    of_others = np.full_like(forces, AT_REST * _at_rest(iterate))
+    of_others = AT_REST * _at_rest(iterate)
     for zone in scene.zones:
         mine = zone.numbers
         places = constraints.gaps[mine].indices
         stress = iterate.sizes.stress[places // dim].max(initial=0.0)
         scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
-        noise = forces + unbalanced[places].max(initial=0.0)
+        noise = forces + unbalanced[places].max(initial=0.0) + of_others / _ERRORS
         for rows in (mine, *zone.slips):
             # Of what may close: a sliver under the end of the master has no pressure to round.
             there = constraints.eligible[rows]
             acting = moving[rows][there]
             error = pressure_of_forces(acting, noise)
             error += pressure_of_gaps(acting, known[rows][there], diagonal)
-            limit[rows] = _NOISE * scale + _ERRORS * error + pressure_of_forces(acting, of_others)
+            limit[rows] = _NOISE * scale + _ERRORS * error
     motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
     covered = np.where(constraints.eligible, constraints.covered, np.inf)
     return Trial(

@@ -287,11 +287,8 @@ def remarks(found: Validity) -> Iterator[Line]:
 
 def allowed_of_pressure(case: Case, limit: float) -> float:
     """The limit of an error of the pressure, or the case's own tolerance where it is wider."""
-    own = (
-        case.reference.tolerance[check]
-        for check in OF_PRESSURE
-        if check in case.reference.tolerance
-    )
+    tolerance = case.reference.tolerance
+    own = (tolerance[check] for check in OF_PRESSURE if check in tolerance)
     return max(limit, *own, 0.0)
 
 
