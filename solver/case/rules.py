@@ -262,10 +262,18 @@ def _not_moving(case: Case) -> Iterator[Fault]:
 
 
 def _goes_along(case: Case) -> bool:
-    """Whether the exact solution of a case goes along with its rigid body, which steps move."""
+    """Whether the exact solution of a case goes along with its rigid body, which steps move.
+
+    A circle may also turn about its centre.
+    """
     bodies = list(case.rigid.values())
     known = case.reference.exact is not None and case.reference.exact.moved(0.0) is not None
-    return known and len(bodies) == 1 and bodies[0].move.keys() == {"x"} and bool(bodies[0].name)
+    if not known or len(bodies) != 1:
+        return False
+    circle, motion = bodies[0].sphere, set(bodies[0].move)
+    if circle and bodies[0].reference in (None, circle.centre):
+        motion.discard("rz")
+    return motion == {"x"} and bool(bodies[0].name)
 
 
 def _of_dimension(case: Case, dim: int) -> Iterator[Fault]:

@@ -34,6 +34,7 @@ from .errors import SolveError
 # Added to the scaled diagonal of one: motions that nothing resists stay finite. The next ones serve
 # where W as given is not semidefinite.
 _SHIFTS = 1e-13, 1e-11, 1e-9
+_INDEFINITE = "the stiffness that the gaps see is not positive semidefinite"
 
 
 def complementary(matrix: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -47,7 +48,10 @@ def complementary(matrix: np.ndarray, force: np.ndarray) -> np.ndarray:
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
-    scale = 1 / np.sqrt(np.diag(matrix))
+    diagonal = np.diag(matrix)
+    if not (diagonal > 0).all():
+        raise SolveError(_INDEFINITE)
+    scale = 1 / np.sqrt(diagonal)
     matrix = (matrix + matrix.T) / 2 * np.outer(scale, scale)
     for shift in _SHIFTS:
         try:
@@ -57,7 +61,7 @@ def complementary(matrix: np.ndarray, force: np.ndarray) -> np.ndarray:
         except (np.linalg.LinAlgError, RuntimeError):  # of nnls: too many steps
             continue
         return scale * found
-    raise SolveError("the stiffness that the gaps see is not positive semidefinite")
+    raise SolveError(_INDEFINITE)
 
 
 _LOG = logging.getLogger(__name__)

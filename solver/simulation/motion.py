@@ -153,7 +153,8 @@ def _from_there(state: Equilibrium) -> Equilibrium:
 def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames) -> Frames:
     """The new frames of bodies whose contact they move by more than linear theory passes over.
 
-    A body without contact is measured all over, by the smallest face of all.
+    A body without contact is measured all over, by the smallest face of all; a rigid one at its
+    reference point too, about which it may roll.
     """
     points, body = rest.points, rest.body
     moved = np.linalg.norm(new.beyond(old, points, body), axis=1)
@@ -163,9 +164,12 @@ def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames
     for block in faces:
         counted[block.nodes] = True
     alone = ~np.isin(body, body[counted])
-    far = (moved > NOTED_SLIP * size) & (counted | alone)
-    frames = old
-    for number in np.unique(body[far]).tolist():
+    far, frames = body[(moved > NOTED_SLIP * size) & (counted | alone)], old
+    for rigid in rest.frames().values():
+        number = body[rigid.nodes[:1]]
+        if np.linalg.norm(new.beyond(old, rigid.point[None], number)) > NOTED_SLIP * size:
+            far = np.append(far, number)
+    for number in np.unique(far).tolist():
         frames = frames.with_body(number, new.turn[number], new.shift[number])
     return frames
 

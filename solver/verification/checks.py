@@ -65,6 +65,17 @@ def elongation(solution: Solution) -> float:
     return float(solution.scalars.load_scale / stiffness * block_size(solution))
 
 
+def area(solution: Solution) -> float:
+    """The whole area of all zones."""
+    return float(sum(zone.area.sum() for zone in solution.zones))
+
+
+def work(solution: Solution) -> float:
+    """The work of the load along the elongation that it causes, on the smallest body."""
+    stiffness, stress = min(m.young for m in solution.case.materials.values()), load(solution)
+    return float(stress**2 / stiffness * block_size(solution) ** solution.mesh.points.shape[1])
+
+
 def total_force(solution: Solution) -> float:
     """The largest reaction or contact force of any step; one where nothing acts."""
     forces = [one.force for step in solution.steps for one in step.reactions]
@@ -82,6 +93,8 @@ SCALES: dict[str, Callable[[Solution], float]] = {
     "block_size": block_size,
     "load": load,
     "elongation": elongation,
+    "area": area,
+    "work": work,
     "total_force": total_force,
     "total_moment": total_moment,
 }

@@ -260,6 +260,8 @@ def test_two_unknowns_by_hand():
     assert complementary(matrix, np.array([-1.0, -0.5])) == pytest.approx([1.0, 0.0], abs=1e-12)
     assert complementary(matrix, np.array([-1.0, -1.0])) == pytest.approx([2 / 3, 2 / 3])
     assert complementary(matrix, np.array([1.0, 0.0])).tolist() == [0.0, 0.0]
+    with pytest.raises(SolveError, match="not positive semidefinite"):
+        complementary(np.diag([1.0, -1e-9]), np.array([-1.0, -1.0]))
 
 
 @pytest.mark.parametrize("seed", range(20))

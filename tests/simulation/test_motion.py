@@ -194,45 +194,39 @@ def test_a_block_is_pulled_up_a_slope():
     assert np.isfinite(moved).all()
 
 
-def punched(move, friction, **more):
-    """A rigid circle of radius 20 that presses a block by 0.2 and moves along it, in ten steps."""
+def test_a_roller_that_sticks_goes_as_far_as_it_turns():
+    """By R θ, to the order of a/R; its x is free, and no force holds it along."""
     block = {"cells": "QUAD4", "divisions": [40, 10]}
     planes = {"top": ([0.0, 10.0], [0.0, 1.0]), "base": ([0.0, 0.0], [0.0, 1.0])}
-    zone = {"name": "interface", "slave": "top", "master": "punch", "friction": friction}
     bricks = [{"name": "block", "low": [0.0, 0.0], "high": [40.0, 10.0], "block": block}]
-    circle = {"centre": [10.0, 29.8], "radius": 20.0}
-    return moving(
+    circle = {"sphere": {"centre": [10.0, 29.8], "radius": 20.0}, "name": "go"}
+    case = moving(
         mesh={"recipe": "bricks", "bricks": bricks},
         groups={n: {"plane": {"point": p, "normal": v}} for n, (p, v) in planes.items()},
         supports=[{"group": "base", "fix": ["x", "y"]}],
         loads=[],
-        bodies={"punch": {"sphere": circle, "move": move, "name": "go", **more}},
-        contact=[zone],
-        steps=[{"go": 1}],
+        bodies={"roller": {**circle, "move": {"y": 0.0, "rz": -1.0}, "force": {"x": 0.0}}},
+        contact=[{"name": "interface", "slave": "top", "master": "roller", "friction": 0.5}],
+        steps=[{"go": 0}, {"go": 1}],
         substeps=10,
     )
-
-
-def test_a_roller_that_sticks_goes_as_far_as_it_turns():
-    """By R θ, to the order of a/R; its x is free, and no force holds it along."""
-    case = punched({"y": 0.0, "rz": -1.0}, 0.5, force={"x": 0.0})
-    solution = run(replace(case, steps=({"go": 0.0}, *case.steps)))
+    solution = run(case)
     gone = np.array([step.rigid[0].translation[0] for step in solution.steps])
     turned = -np.array([step.rigid[0].rotation[2] for step in solution.steps])
-    assert np.diff(gone)[1:] == pytest.approx(20 * np.diff(turned)[1:], rel=0.01)
+    assert np.diff(gone)[10:] == pytest.approx(20 * np.diff(turned)[10:], rel=0.01)
     forces = [step.resultants["interface"].force[0] for step in solution.steps]
     assert np.abs(forces).max() < 1e-8
 
 
-def test_ironing_has_one_force_in_the_middle_and_the_friction_of_its_path():
-    """T = μ N at every step; N differs little, and work is T times the way."""
-    solution = run(punched({"x": 20.0, "y": 0.0, "rz": 0.0}, 0.3))
-    forces = np.array([step.resultants["interface"].force for step in solution.steps])
-    assert forces[:, 0] / -forces[:, 1] == pytest.approx(0.3, rel=0.01)
-    assert np.ptp(forces[2:7, 1]) < 0.01 * abs(forces[5, 1])
-    for step, force in zip(solution.steps[2:7], forces[2:7], strict=True):
-        assert step.work == pytest.approx(2.0 * force[0], rel=0.02)
-        assert step.dissipation == pytest.approx(step.work, rel=0.1)
+def test_a_roller_goes_as_far_as_it_is_moved():
+    """Its contact stays where it is; its centre goes on, and does not rise."""
+    case = load_case(CASES / "motion/rolling.yaml")
+    solution = run(replace(case, steps=case.steps[:3]))
+    for step, gone in zip(solution.steps, (0.05, 1.35, 2.65), strict=True):
+        rigid = step.rigid[0]
+        assert rigid.translation == pytest.approx([gone, 0.0], abs=1e-6)
+        assert step.rigid[0].rotation[2] == pytest.approx(-gone / 5000)
+    assert rigid.point == pytest.approx([2.65, 5000.0])
 
 
 def test_a_ring_that_turns_rubs_by_its_pressure():

@@ -34,6 +34,14 @@ def test_every_row_names_functions_that_are_there():
         assert check.scale in SCALES, check.name
 
 
+def test_only_numbers_without_a_unit_are_compared_with_one(solution):
+    """Where the reference is zero; the blocks are 50 wide, pressed by 25, E = 2000."""
+    plain = {check.name for check in CHECKS if check.scale == "unit"} - set(ERRORS)
+    assert plain == {"element_status", "coverage", "balance", "friction_law", "counts"}
+    assert SCALES["area"](solution) == 50.0
+    assert SCALES["work"](solution) == pytest.approx(25.0**2 / 2000.0 * 50.0**2)
+
+
 def test_the_exact_state_passes_every_check_of_the_table(solution):
     checks = run_checks(solution)
     given = {None, *solution.case.reference.values}
