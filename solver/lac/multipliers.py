@@ -178,20 +178,21 @@ def close_faces(parts: Sequence[Integrals]) -> tuple[list[Integrals], int]:
 def _close_block(parts: Sequence[Integrals], side: int) -> tuple[list[Integrals], int]:
     """The same for the faces of one block, given all integrals on it."""
     block = parts[0].segments.sides[side].faces
-    n = len(block.number)
-    area, lowest, highest = np.zeros(n), np.ones(n), np.zeros(n)
+    n, dim = len(block.number), block.normal.shape[1]
+    area, lowest, highest = np.zeros(n), np.ones((n, dim)), -np.ones((n, dim))
     summed = np.zeros((n, block.type.n_nodes))
     for part in parts:
-        face, normal = part.segments.sides[side].face, part.segments.normal[:, 0]
-        cosine = np.abs(np.einsum("sd,sd->s", normal, block.normal[face]))
+        face, normal = part.segments.sides[side].face, part.segments.normal
         area += np.bincount(face, part.segments.area, minlength=n)
-        np.minimum.at(lowest, face, cosine)
-        np.maximum.at(highest, face, cosine)
-        np.add.at(summed, face, np.einsum("skad,sd->sa", part.vectors[side], normal))
-    exact = shape_integrals(block) * highest[:, None]
+        np.minimum.at(lowest, face, normal.min(axis=1))
+        np.maximum.at(highest, face, normal.max(axis=1))
+        np.add.at(summed, face, np.einsum("skad,sd->sa", part.vectors[side], normal[:, 0]))
+    # Along one normal, a face is seen by its cosine.
+    cosine = np.abs(np.einsum("nd,nd->n", (lowest + highest) / 2, block.normal))
+    exact = shape_integrals(block) * cosine[:, None]
     whole = exact.sum(axis=1)
-    full = np.abs(area - whole) <= _FULL * whole
-    full &= block.flat & (highest - lowest <= _ONE_NORMAL)
+    full = block.flat & (area > 0) & (np.abs(area - whole) <= _FULL * whole)
+    full &= (highest - lowest <= _ONE_NORMAL).all(axis=1)
     defect = np.where(full[:, None], exact - summed, 0.0)
     changed = []
     for part in parts:

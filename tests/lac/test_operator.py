@@ -185,6 +185,21 @@ def test_nodal_normals_keep_forces_and_moments_in_balance(rise):
     assert operator.closed_faces == 0
 
 
+def test_a_keel_on_a_trapezium_has_forces_and_moments_in_balance():
+    """Both slopes see it at the same angle, not along one normal: nothing closes its integrals."""
+    trapezium = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.6, 1.0, 0.0), (-0.6, 1.0, 0.0)]
+    keel = [(x, y, abs(x) / 4) for y in (-2.0, 2.0) for x in (-2.0, 0.0, 2.0)]
+    points, kind = np.array(trapezium + keel), BY_NAME["QUAD4"]
+    slave = facets(points, kind, np.array([[4, 7, 8, 5], [5, 8, 9, 6]]), np.arange(2))
+    master = facets(points, kind, np.array([[0, 1, 2, 3]]), np.arange(1))
+    operator = gap_operator([slave], [master], 2, len(points), 4.0)
+    assert operator.covered == pytest.approx([1.6 / np.hypot(1, 1 / 4)] * 2)
+    for axis in np.eye(3):
+        for motion in (np.tile(axis, (len(points), 1)), np.cross(axis, points)):
+            assert operator.matrix @ motion.ravel() == pytest.approx(np.zeros(2), abs=1e-12)
+    assert operator.closed_faces == 0
+
+
 def test_on_the_axis_a_face_has_a_normal_but_no_area():
     points = np.array([[2.0, 1.0], [0.0, 1.0]])
     edge = facets(points, BY_NAME["SEG2"], np.array([[0, 1]]), np.array([0]), axisymmetric=True)
