@@ -125,7 +125,7 @@ def _verdict(file: RecordedFile, result: RecordedResult, case: str, family: str)
         reason=NOT_JUDGED,
         checks=checks,
         worst=CheckError(name=worst.name, error=worst.error) if worst else None,
-        cost=Cost(seconds={} if result.seconds is None else {"total": result.seconds}),
+        cost=Cost.in_all(result.seconds),
         foreign=Foreign(
             code=f"{file.code}-{file.version}",
             code_version=file.version,

@@ -187,7 +187,7 @@ def without_foreign(
     """
     verdict = without_result(word, reason, case, case.solved_as)
     named = _named(verdict, code, version, settings or {})
-    return replace(named, cost=Cost(seconds={} if seconds is None else {"total": seconds}))
+    return replace(named, cost=Cost.in_all(seconds))
 
 
 def _named(verdict: Verdict, code: str, version: str, settings: Mapping[str, str]) -> Verdict:
@@ -236,9 +236,9 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
             coverage=None,
         ),
         estimates=replace(verdict.estimates, pressure_error_estimate=None),
-        cost=Cost(
+        cost=Cost.in_all(
+            foreign.seconds,
             macro_elements=solution.cost.macro_elements,
-            seconds={} if foreign.seconds is None else {"total": foreign.seconds},
             cpu_seconds=foreign.cpu_seconds,
             peak_memory_mb=foreign.peak_memory_mb,
         ),

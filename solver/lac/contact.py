@@ -8,7 +8,7 @@ inside. Source: Abbas, Drouet, Hild, The Local Average Contact (LAC) method, CMA
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import skfem
@@ -91,6 +91,15 @@ class RecoveredState:
         psi = self._recovery.moments.local.shapes(facet, np.asarray(x).T[:, None], form)[:, 0]
         own = self._coefficients.reshape(len(self.error), -1)[facet]
         return np.asarray(self.state.pressure[facet] + (psi * own).sum(axis=1))
+
+
+class _Corrected(NamedTuple):
+    """A system under a recovered pressure, whose `fit` to the `means` (k,) of facets it is."""
+
+    system: SaddlePoint
+    closed: np.ndarray
+    fit: csr_matrix
+    means: np.ndarray
 
 
 class LocalAverageContact:
@@ -293,28 +302,26 @@ class LocalAverageContact:
         system, closed, size = state._system, state.closed, len(state._system.force)
         added = numbered(recovery.loads, self._unknown, size).T
 
-        def correct(closed: np.ndarray) -> tuple[SaddlePoint, np.ndarray, csr_matrix, np.ndarray]:
+        def correct(closed: np.ndarray) -> _Corrected:
             fit = recovery.reconstruction(closed).matrix
             means = system.settled(closed, added @ fit, shape.sweeps)
-            return system.under(added @ (fit @ means)), closed, fit, means
+            return _Corrected(system.under(added @ (fit @ means)), closed, fit, means)
 
-        def wrong(found: tuple[Any, ...]) -> bool:
-            corrected, closed, *_ = found
-            violation = corrected.trial(closed).violation(closed)
+        def wrong(found: _Corrected) -> bool:
+            violation = found.system.trial(found.closed).violation(found.closed)
             return bool((self._opposed & (violation > 1)).any())
 
-        def again(found: tuple[Any, ...]) -> np.ndarray:
-            corrected, closed, *_ = found
-            settling = corrected.trial, closed, self._opposed, self.area, corrected.stiffness
-            return find_status(*settling).closed
+        def again(found: _Corrected) -> np.ndarray:
+            system, opposed = found.system, self._opposed
+            status = find_status(system.trial, found.closed, opposed, self.area, system.stiffness)
+            return status.closed
 
         settled = with_status(closed, correct, wrong, again)
         if settled is None:
             raise SolveError("the contact status does not settle under the recovered pressure")
-        corrected, closed, fit, means = settled
-        found = _state(corrected, closed, state.iterations)
+        found = _state(settled.system, settled.closed, state.iterations)
         applied = shape.degree == 2 and shape.keeps_means
-        coefficients = fit @ (means if applied else found.pressure)
+        coefficients = settled.fit @ (settled.means if applied else found.pressure)
         return RecoveredState(found, recovery.error(coefficients), recovery, coefficients)
 
 

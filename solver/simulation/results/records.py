@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -65,6 +65,11 @@ class Cost:
     stage_cpu_seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: float | None = None
     peak_memory_mb: float | None = None
+
+    @classmethod
+    def in_all(cls, seconds: float | None, **more: Any) -> Self:
+        """That of another code, of which no stages are known."""
+        return cls(seconds={} if seconds is None else {"total": seconds}, **more)
 
 
 @dataclass
