@@ -289,7 +289,8 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
             return FieldError((*keys, *own.keys), own.problem, value)
     # `2,5`, as some countries write it, is text.
     point = "; write numbers with a point" * bool(re.fullmatch(r"-?\d+,\d+", str(value)))
-    return FieldError(keys, f"must be {described(kind)}{point}", value)
+    words = described(kind)
+    return FieldError(keys, f"must be {words}{point}" if words else "must have a value", value)
 
 
 def _is_like(kind: Any, value: object) -> bool:

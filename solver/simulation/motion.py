@@ -112,8 +112,11 @@ def _in_place(
     frames = _followed(rest, faces, frames, wanted)
     for count in range(1, _ROUNDS + 1):
         groups = Moved(rest, faces, step, frames, wanted)
+        rounding = _rounding(model, groups)
+        if rounding > NOTED_SLIP * _smallest_edge(rest.points, faces):
+            raise SolveError("bodies are so far away that coordinates no longer tell nodes apart")
         try:
-            scene = scene_of(replace(model, rounding=_rounding(model, groups)), groups, clock)
+            scene = scene_of(replace(model, rounding=rounding), groups, clock)
             if last is None:
                 refuse_unfit(scene)
             with stage(clock, "assembly"):
@@ -143,6 +146,12 @@ def _rounding(model: CutModel, groups: Moved) -> float:
     return max(model.rounding, float(np.finfo(float).eps) * farthest)
 
 
+def _smallest_edge(points: np.ndarray, faces: list[FaceBlock]) -> float:
+    """The smallest first edge of faces, a length."""
+    edges = [points[block.nodes[:, 1]] - points[block.nodes[:, 0]] for block in faces]
+    return min((float(np.linalg.norm(e, axis=1).min()) for e in edges), default=np.inf)
+
+
 def _from_there(state: Equilibrium) -> Equilibrium:
     """A state from which slips are counted anew, as the step's displacement has those before."""
     assert state.friction is not None
@@ -158,8 +167,7 @@ def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames
     """
     points, body = rest.points, rest.body
     moved = np.linalg.norm(new.beyond(old, points, body), axis=1)
-    edges = [points[block.nodes[:, 1]] - points[block.nodes[:, 0]] for block in faces]
-    size = min((float(np.linalg.norm(e, axis=1).min()) for e in edges), default=np.inf)
+    size = _smallest_edge(points, faces)
     counted = np.zeros(len(moved), dtype=bool)
     for block in faces:
         counted[block.nodes] = True

@@ -217,7 +217,7 @@ def _over(deviation: float, scale: float) -> float:
     """The deviation over the scale; with a scale of zero, 0 only for no deviation."""
     if scale == 0:
         return 0.0 if deviation == 0 else float("inf") if deviation > 0 else float("nan")
-    return float(deviation / scale)
+    return float(deviation) / float(scale)
 
 
 def regression_file(solution: Solution) -> Path:

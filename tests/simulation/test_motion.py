@@ -229,6 +229,13 @@ def test_a_roller_goes_as_far_as_it_is_moved():
     assert rigid.point == pytest.approx([2.65, 5000.0])
 
 
+def test_bodies_beyond_the_digits_of_coordinates_have_no_place():
+    case = load_case(CASES / "motion/rolling.yaml")
+    far = structs.replace(case.rigid["cylinder"], move={"x": 1e20})
+    with pytest.raises(SolveError, match="no longer tell nodes apart"):
+        run(replace(case, rigid={"cylinder": far}))
+
+
 def test_a_ring_that_turns_rubs_by_its_pressure():
     """Its moment is μ p 2πr², at every angle that it slid to, to the error of its polygons."""
     case = load_case(CASES / "motion/rings.yaml")

@@ -58,16 +58,16 @@ class Known:
 
 
 def build(
-    given: str | Mapping[str, Any], known: Known, key: str = "reference.solution"
+    given: str | Mapping[str, Any] | None, known: Known, key: str = "reference.solution"
 ) -> ExactSolution:
     """The solution that a case file names under a `key`, alone or with parameters.
 
     Raises InputError for an unknown name or parameter, and for a value not allowed.
     """
-    values = {"name": given} if isinstance(given, str) else dict(given)
+    values = dict(given) if isinstance(given, Mapping) else {"name": given}
     name = values.pop("name", None)
     if not isinstance(name, str) or name not in SOLUTIONS:
-        place = key if isinstance(given, str) else f"{key}.name"
+        place = f"{key}.name" if isinstance(given, Mapping) else key
         allowed = "this key is needed" if name is None else "no such solution"
         raise InputError(known.where, place, name, f"{allowed}; {hint(str(name), SOLUTIONS)}")
     cls = SOLUTIONS[name]

@@ -229,12 +229,12 @@ class PartialWaves(Pressed):
     def measured(
         self, x: np.ndarray, force: np.ndarray, centre: np.ndarray, mean: np.ndarray
     ) -> dict[str, float]:
-        """Those of the half ellipse of p/cos ψ over sin ψ."""
+        """Those of the half ellipse of p/cos ψ over sin ψ; at most the whole wave."""
         angle = pi / (2 * self.size)
         place, at = np.abs(np.sin(angle * self.place(x))), angle * self.place(centre)
         found = half_ellipse(place, force, np.abs(np.sin(at)), mean / np.cos(at), 0.25)
         if found:
-            found["half_width"] = float(np.arcsin(found["half_width"]) / angle)
+            found["half_width"] = float(np.arcsin(min(found["half_width"], 1.0)) / angle)
         return found
 
 

@@ -117,6 +117,9 @@ def test_a_plane_state_fills_three_dimensions_but_is_not_around_an_axis():
         (TUBES.replace("cylinders", "spheres"), "is for 3 dimensions; the case has 2"),
         (TUBES.replace("bottom", "{young: -1, poisson: 0}"), "inner = {'young': -1"),
         (TUBES.replace("bottom", "bottom, dim: 3"), "nested_cylinders has no such parameter"),
+        ("{name: sheared, friction: 0.5, shear: [0.5]}", "contact: this key is needed"),
+        ("{name: sheared, contact: 0.5}", "contact = 0.5: no such solution"),
+        ("{name: sheared, contact: null}", "contact: must have a value"),
     ],
 )
 def test_refused(solution, message):
