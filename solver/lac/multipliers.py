@@ -184,8 +184,9 @@ def _close_block(parts: Sequence[Integrals], side: int) -> tuple[list[Integrals]
     for part in parts:
         face, normal = part.segments.sides[side].face, part.segments.normal
         area += np.bincount(face, part.segments.area, minlength=n)
-        np.minimum.at(lowest, face, normal.min(axis=1))
-        np.maximum.at(highest, face, normal.max(axis=1))
+        for axis in range(dim):
+            np.minimum.at(lowest[:, axis], face, normal[..., axis].min(axis=1))
+            np.maximum.at(highest[:, axis], face, normal[..., axis].max(axis=1))
         np.add.at(summed, face, np.einsum("skad,sd->sa", part.vectors[side], normal[:, 0]))
     # Along one normal, a face is seen by its cosine.
     cosine = np.abs(np.einsum("nd,nd->n", (lowest + highest) / 2, block.normal))
