@@ -93,7 +93,7 @@ class RecoveredState:
         return np.asarray(self.state.pressure[facet] + (psi * own).sum(axis=1))
 
 
-class _Corrected(NamedTuple):
+class _UnderRecovery(NamedTuple):
     """A system under a recovered pressure, whose `fit` to the `means` (k,) of facets it is."""
 
     system: SaddlePoint
@@ -302,16 +302,16 @@ class LocalAverageContact:
         system, closed, size = state._system, state.closed, len(state._system.force)
         added = numbered(recovery.loads, self._unknown, size).T
 
-        def correct(closed: np.ndarray) -> _Corrected:
+        def correct(closed: np.ndarray) -> _UnderRecovery:
             fit = recovery.reconstruction(closed).matrix
             means = system.settled(closed, added @ fit, shape.sweeps)
-            return _Corrected(system.under(added @ (fit @ means)), closed, fit, means)
+            return _UnderRecovery(system.under(added @ (fit @ means)), closed, fit, means)
 
-        def wrong(found: _Corrected) -> bool:
+        def wrong(found: _UnderRecovery) -> bool:
             violation = found.system.trial(found.closed).violation(found.closed)
             return bool((self._opposed & (violation > 1)).any())
 
-        def again(found: _Corrected) -> np.ndarray:
+        def again(found: _UnderRecovery) -> np.ndarray:
             system, opposed = found.system, self._opposed
             status = find_status(system.trial, found.closed, opposed, self.area, system.stiffness)
             return status.closed
