@@ -266,14 +266,14 @@ def _goes_along(case: Case) -> bool:
 
     A circle may also turn about its centre.
     """
-    bodies = list(case.rigid.values())
-    known = case.reference.exact is not None and case.reference.exact.moved(0.0) is not None
-    if not known or len(bodies) != 1:
+    exact = case.reference.exact
+    if exact is None or exact.moved(0.0) is None or len(case.rigid) != 1:
         return False
-    circle, motion = bodies[0].sphere, set(bodies[0].move)
-    if circle and bodies[0].reference in (None, circle.centre):
+    (body,) = case.rigid.values()
+    motion = set(body.move)
+    if body.sphere and body.reference in (None, body.sphere.centre):
         motion.discard("rz")
-    return motion == {"x"} and bool(bodies[0].name)
+    return motion == {"x"} and bool(body.name)
 
 
 def _of_dimension(case: Case, dim: int) -> Iterator[Fault]:

@@ -112,11 +112,8 @@ def _in_place(
     frames = _followed(rest, faces, frames, wanted)
     for count in range(1, _ROUNDS + 1):
         groups = Moved(rest, faces, step, frames, wanted)
-        rounding = _rounding(model, groups)
-        if rounding > NOTED_SLIP * _smallest_edge(rest.points, faces):
-            raise SolveError("bodies are so far away that coordinates no longer tell nodes apart")
         try:
-            scene = scene_of(replace(model, rounding=rounding), groups, clock)
+            scene = scene_of(replace(model, rounding=_rounding(model, groups)), groups, clock)
             if last is None:
                 refuse_unfit(scene)
             with stage(clock, "assembly"):
@@ -141,15 +138,22 @@ def _in_place(
 
 
 def _rounding(model: CutModel, groups: Moved) -> float:
-    """How well coordinates are known, those of places far from the mesh as given too."""
+    """How well coordinates are known, those of places far from the mesh as given too.
+
+    Raises SolveError where that is no better than what linear theory passes over.
+    """
     farthest = float(np.abs(groups.points + groups.origin).max())
-    return max(model.rounding, float(np.finfo(float).eps) * farthest)
+    known = max(model.rounding, float(np.finfo(float).eps) * farthest)
+    if known > _passed_over(groups.rest.points, groups.contact_faces):
+        raise SolveError("bodies are so far away that coordinates no longer tell nodes apart")
+    return known
 
 
-def _smallest_edge(points: np.ndarray, faces: list[FaceBlock]) -> float:
-    """The smallest first edge of faces, a length."""
+def _passed_over(points: np.ndarray, faces: list[FaceBlock]) -> float:
+    """The largest motion that linear theory passes over: a share of the smallest contact face."""
     edges = [points[block.nodes[:, 1]] - points[block.nodes[:, 0]] for block in faces]
-    return min((float(np.linalg.norm(e, axis=1).min()) for e in edges), default=np.inf)
+    size = min((float(np.linalg.norm(e, axis=1).min()) for e in edges), default=np.inf)
+    return NOTED_SLIP * size
 
 
 def _from_there(state: Equilibrium) -> Equilibrium:
@@ -167,15 +171,15 @@ def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames
     """
     points, body = rest.points, rest.body
     moved = np.linalg.norm(new.beyond(old, points, body), axis=1)
-    size = _smallest_edge(points, faces)
+    most = _passed_over(points, faces)
     counted = np.zeros(len(moved), dtype=bool)
     for block in faces:
         counted[block.nodes] = True
     alone = ~np.isin(body, body[counted])
-    far, frames = body[(moved > NOTED_SLIP * size) & (counted | alone)], old
+    far, frames = body[(moved > most) & (counted | alone)], old
     for rigid in rest.frames().values():
         number = body[rigid.nodes[:1]]
-        if np.linalg.norm(new.beyond(old, rigid.point[None], number)) > NOTED_SLIP * size:
+        if np.linalg.norm(new.beyond(old, rigid.point[None], number)) > most:
             far = np.append(far, number)
     for number in np.unique(far).tolist():
         frames = frames.with_body(number, new.turn[number], new.shift[number])

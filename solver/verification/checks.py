@@ -47,6 +47,11 @@ def block_size(solution: Solution) -> float:
     return min(float(np.ptp(points, axis=0).max()) for points in bodies if len(points))
 
 
+def _softest(solution: Solution) -> float:
+    """The smallest Young's modulus."""
+    return min(material.young for material in solution.case.materials.values())
+
+
 def load(solution: Solution) -> float:
     """The load; without loads the stress that the displacement would cause, if that is larger.
 
@@ -54,15 +59,14 @@ def load(solution: Solution) -> float:
     """
     if solution.case.loads:
         return float(solution.scalars.load_scale)
-    stiffness = min(m.young for m in solution.case.materials.values())
     moved = float(np.abs(solution.displacement).max(initial=0.0))
-    return max(float(solution.scalars.load_scale), stiffness * moved / solution.scalars.length)
+    caused = _softest(solution) * moved / solution.scalars.length
+    return max(float(solution.scalars.load_scale), caused)
 
 
 def elongation(solution: Solution) -> float:
     """Load / stiffness × size."""
-    stiffness = min(m.young for m in solution.case.materials.values())
-    return float(solution.scalars.load_scale / stiffness * block_size(solution))
+    return float(solution.scalars.load_scale / _softest(solution) * block_size(solution))
 
 
 def area(solution: Solution) -> float:
@@ -72,8 +76,8 @@ def area(solution: Solution) -> float:
 
 def work(solution: Solution) -> float:
     """The work of the load along the elongation that it causes, on the smallest body."""
-    stiffness, stress = min(m.young for m in solution.case.materials.values()), load(solution)
-    return float(stress**2 / stiffness * block_size(solution) ** solution.mesh.points.shape[1])
+    dim = solution.mesh.points.shape[1]
+    return float(load(solution) ** 2 / _softest(solution) * block_size(solution) ** dim)
 
 
 def total_force(solution: Solution) -> float:

@@ -225,7 +225,7 @@ def test_a_roller_goes_as_far_as_it_is_moved():
     for step, gone in zip(solution.steps, (0.05, 1.35, 2.65), strict=True):
         rigid = step.rigid[0]
         assert rigid.translation == pytest.approx([gone, 0.0], abs=1e-6)
-        assert step.rigid[0].rotation[2] == pytest.approx(-gone / 5000)
+        assert rigid.rotation[2] == pytest.approx(-gone / 5000)
     assert rigid.point == pytest.approx([2.65, 5000.0])
 
 
