@@ -45,10 +45,32 @@ def test_ctrl_c_leaves_no_verdict_and_nothing_runs_on(tmp_path):
     assert "crashed:" not in (tmp_path / "output").read_text()
 
 
+START = [sys.executable, "-I", str(ROOT / "workflow" / "start.py"), "--version"]
+# A case that is valid: `list` and `--version` end before a signal reaches them.
+SOLVER = [sys.executable, str(ROOT / "solver"), "validate", "cases/ssnp170/e.yaml"]
+
+
+@pytest.mark.parametrize("command", [START, SOLVER], ids=["Snakemake", "solver"])
 @pytest.mark.parametrize("after", [0.1, 0.3, 0.6])
-def test_ctrl_c_while_python_starts_prints_no_traceback(tmp_path, after):
-    start = [sys.executable, "-I", str(ROOT / "workflow" / "start.py"), "--version"]
-    with subprocess.Popen(start, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as run:
+def test_ctrl_c_while_python_starts_prints_no_traceback(command, after):
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as run:
         time.sleep(after)
         run.send_signal(signal.SIGINT)
         assert "Traceback" not in run.communicate()[1]
+
+
+# It runs a program, and sends the interrupt from an exit handler: there Python ignores it, with a
+# traceback.
+INTERRUPTED_AT_EXIT = """
+import atexit, os, runpy, signal, sys
+atexit.register(os.kill, os.getpid(), signal.SIGINT)
+del sys.argv[0]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("command", [START[2:], SOLVER[1:]], ids=["Snakemake", "solver"])
+def test_ctrl_c_while_python_exits_prints_no_traceback(command):
+    run = [sys.executable, "-c", INTERRUPTED_AT_EXIT, *command]
+    ended = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (-signal.SIGINT, "")

@@ -1,12 +1,21 @@
 """How Snakemake is started: `workflow/start.py`."""
 
 import runpy
+import signal
 import sys
 
 import pytest
 from snakemake import cli
 
 from tests.workflow.projects import ROOT
+
+
+@pytest.fixture(autouse=True)
+def _ctrl_c():
+    """The start ends with the system's own handling of Ctrl-C, here in the process of the tests."""
+    handler = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, handler)
 
 
 @pytest.mark.parametrize(
