@@ -1,7 +1,13 @@
 """States of friction that Newton's method finds by a way of its own."""
 
+from pathlib import Path
+
 import pytest
 
+from solver.case.reader import parse_case
+from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.scene.scene import build_scene
+from solver.verification.run import mesh_of
 from tests.scenes import circle_on_block, solved
 
 
@@ -63,3 +69,31 @@ contact:
     assert (two.friction.status == 1).all()
     force = found.steps[-1].resultants["one"].force
     assert abs(force[0]) == pytest.approx(0.2 * 50.0, rel=1e-8)
+
+
+
+def test_a_gap_that_lifts_a_free_body_counts_as_another():
+    """One face on a rigid parabola: its gap brings up no force, and is zero all the same."""
+    text = """
+name: block
+mesh:
+  recipe: bricks
+  bricks: [{name: block, low: [0, 0], high: [1.5, 0.4], block: {cells: TRIA3, divisions: [1, 2]}}]
+plane: strain
+materials: {all: {young: 1263.0, poisson: 0.45}}
+groups:
+  base: {plane: {point: [0, 0], normal: [0, 1]}}
+  press: {plane: {point: [0, 0.4], normal: [0, 1]}}
+  side: {plane: {point: [0, 0], normal: [1, 0]}}
+bodies: {floor: {parabola: {point: [0.7, 0], normal: [0, 1], radius: 31}}}
+supports: [{group: side, fix: [x]}]
+loads: [{group: press, pressure: 3.0}]
+contact: [{name: below, slave: base, master: floor, friction: 0.2}]
+"""
+    case = parse_case(text, Path("block.yaml"))
+    stiffness, size = ContactProblem(build_scene(case, mesh_of(case))).contact_stiffness()
+    assert abs(stiffness[0, 0]) < 1e-9 * size[0]
+    assert size[0] > 1e-4 * size[1]
+    (zone,) = solved(text).zones
+    assert abs(zone.gap) < 1e-15
+    assert zone.friction.status == 2

@@ -73,7 +73,7 @@ class CoulombContact:
     """The contact of m gaps and of f macro-elements with friction, which slip along k tangents.
 
     `stiffness` S (r, r), symmetric, a matrix or a product: rows of the gaps come first; `diagonal`
-    (r,) is about that of S; `friction` μ (f,); `of` (f,): the gap each one has; `rows` (k, f):
+    (r,) is about that of S, positive; `friction` μ (f,); `of` (f,): the gap each one has; `rows` (k, f):
     those of its slips, by tangent, in any order.
     """
 
@@ -87,10 +87,10 @@ class CoulombContact:
     ):
         self.stiffness, self.friction, self.of = stiffness, friction, of
         self.m, self.rows = len(diagonal) - rows.size, list(rows)
-        self.c = np.abs(diagonal)
+        self.c = diagonal.copy()
         # One for all tangents of a macro-element, or its traction would not be along its slip.
         for rows in self.rows:
-            self.c[rows] = np.mean([np.abs(diagonal)[each] for each in self.rows], axis=0)
+            self.c[rows] = np.mean([diagonal[each] for each in self.rows], axis=0)
 
     def solve(
         self,

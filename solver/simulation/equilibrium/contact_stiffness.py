@@ -10,6 +10,8 @@ from .constraints import ContactConstraints
 # More rows than these make the matrix of the contact alone too large, or, where each column takes
 # iterations, too long to make: 867 rows of 60,000 unknowns take 65 s, products alone 22 s.
 _MOST_ROWS, _MOST_ITERATIVE = 4000, 400
+# A row whose jump moves a free body brings up nothing, and gets this share of its nodes' stiffness.
+_LEAST = 1e-3
 # Entries of the solutions that are kept at once.
 _AT_ONCE = 1 << 23
 
@@ -17,23 +19,23 @@ _AT_ONCE = 1 << 23
 def contact_stiffness(
     systems: Systems, matrix: Stiffness, constraints: ContactConstraints, diagonal: np.ndarray
 ) -> tuple[np.ndarray | LinearOperator, np.ndarray]:
-    """`stiffness_of` all that may close or stick (e, e), and about its diagonal (e,).
+    """`stiffness_of` all that may close or stick (e, e), and about its diagonal (e,), positive.
 
-    `diagonal` (n_free,) is that of the `matrix`. For a large contact it is a product, by one
+    `diagonal` (n_dofs,) is that of the stiffness. For a large contact S is a product, by one
     solution each.
     """
-    rows = constraints.eligible
+    rows, of_nodes = constraints.eligible, _of_slave_nodes(constraints, diagonal)
     iterative = systems.factored(rows).factor.iterative
     if rows.sum() > (_MOST_ITERATIVE if iterative else _MOST_ROWS):
-        return _products(systems, matrix, constraints, diagonal)
+        return _products(systems, matrix, constraints), of_nodes
     found = stiffness_of(systems, matrix, constraints, rows)
     found = (found + found.T) / 2
-    return found, np.diag(found)
+    return found, np.maximum(np.abs(np.diag(found)), _LEAST * of_nodes)
 
 
 def _products(
-    systems: Systems, matrix: Stiffness, constraints: ContactConstraints, diagonal: np.ndarray
-) -> tuple[LinearOperator, np.ndarray]:
+    systems: Systems, matrix: Stiffness, constraints: ContactConstraints
+) -> LinearOperator:
     rows = constraints.eligible
     system, area = systems.factored(rows), constraints.covered[rows]
     nothing, size = np.zeros(matrix.shape[0]), len(area)
@@ -42,11 +44,15 @@ def _products(
         change = system.correction(nothing, area * jump.ravel())
         return area * system.multiplier(-(matrix @ change))
 
-    stiff = diagonal > 0  # rigid unknowns have none
-    moving = constraints.gaps[rows].power(2)[:, stiff]
-    soft = np.asarray(moving @ (1 / diagonal[stiff]))
-    found = area**2 / np.where(soft > 0, soft, soft.max(initial=0.0) or 1.0)
-    return LinearOperator((size, size), matvec=product, dtype=float), found
+    return LinearOperator((size, size), matvec=product, dtype=float)
+
+
+def _of_slave_nodes(constraints: ContactConstraints, diagonal: np.ndarray) -> np.ndarray:
+    """The forces (e,) that average gaps and slips bring up where each slave node moves alone."""
+    rows, stiff = constraints.eligible, diagonal > 0
+    soft = np.asarray(constraints.moving[rows].power(2)[:, stiff] @ (1 / diagonal[stiff]))
+    soft = np.where(soft > 0, soft, soft.max(initial=0.0) or 1.0)
+    return np.asarray(constraints.covered[rows] ** 2 / soft)
 
 
 def stiffness_of(

@@ -182,7 +182,7 @@ class Search:
         pressure, gap = found.pressure.copy(), found.gap.copy()
         total, jump = self.total.copy(), self.jump.copy()
         jump[self.rows] += gap[self.rows]
-        pressure[base.normal & ~closed], gap[closed] = 0.0, 0.0
+        pressure[base.normal & ~closed], gap[closed] = 0.0, found.iterate.gap[closed]
         pressure[self.rows] = np.where(kept, pressure[self.rows], 0.0)
         gap[self.rows] = np.where(slips, gap[self.rows], 0.0)
         total[self.rows] += gap[self.rows]

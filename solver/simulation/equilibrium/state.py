@@ -241,13 +241,21 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    if max(errors.values()) >= scale:
-        of_others = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
-        if _at_rest(iterate) or scale <= AT_REST * of_others:
-            # The pressure is rounding: nothing presses. The measure is what strains and motions
-            # would be.
-            scale = max(scale, iterate.sizes.highest, stress_at_rest(scene, moved), of_others)
+    if max(errors.values()) > 10.0**-LEAST_DIGITS * scale:
+        scale = max(scale, _scale_of_rest(iterate, scale, max(errors.values())))
     return Accuracy({name: error / scale for name, error in errors.items()})
+
+
+def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float) -> float:
+    """What strains and motions would be, where the largest `pressure` is rounding; 0 elsewhere."""
+    scene, at_rest = iterate.scene, _at_rest(iterate) > 0
+    stress = stress_at_rest(scene, iterate.displacement.total)
+    loaded = np.full(scene.points.size, scene.loads.at_work.force)
+    of_others = pressure_of_forces(iterate.constraints.moving[iterate.closed], loaded)
+    nothing = AT_REST * max(of_others, stress if at_rest else 0.0)
+    if pressure <= nothing or (at_rest and error >= pressure):
+        return max(of_others, stress, iterate.sizes.highest)
+    return 0.0
 
 
 def _at_rest(iterate: ContactIterate) -> float:

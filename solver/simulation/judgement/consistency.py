@@ -63,7 +63,7 @@ def _numbers(name: str, item: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
-    """Whether p ≥ 0 and ḡ ≥ 0, on the scales of the zone's own stress and displacement."""
+    """Whether p ≥ 0, ḡ ≥ 0 and p ḡ = 0, on the scales of the zone's own stress and displacement."""
     nodes = np.union1d(zone.slave_nodes, zone.master_nodes)
     moved, contact = solution.displacement[nodes], zone.nodal or zone
     own = float(np.abs(contact.multiplier).max(initial=0.0))
@@ -83,6 +83,10 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     place = float(np.abs(solution.mesh.points[nodes]).max() + np.abs(moved).max())
     gives_way = solution.case.zone_named(zone.name).gives_way
     gap = contact.gap[~contact.closed] if gives_way else contact.gap
+    none = _TOLERANCE * size + round_off * place
     worst = float(gap.min(initial=0.0))
-    if worst < -_TOLERANCE * size - round_off * place:
+    if worst < -none:
         yield f"zone {zone.name}: the surfaces overlap, a gap of {worst:.3g}"
+    worst = 0.0 if gives_way else float(gap[contact.closed].max(initial=0.0))
+    if worst > none:
+        yield f"zone {zone.name}: contact that is closed has a gap of {worst:.3g}"
