@@ -112,6 +112,33 @@ def test_refusals_on_and_beyond_the_axis():
         simulate(case(", treatment: node_to_segment").as_solved(True), given)
 
 
+@pytest.mark.parametrize(
+    ("acting", "key"),
+    [
+        ("{group: symx, spring: {normal: 9}}", "supports[0].spring.normal"),
+        ("{group: symx, spring: {y: 9}}", "supports[0].spring.y"),
+        ("{group: symx, pressure: 9}", "loads[0].group"),
+        ("{group: symx, traction: [0, 9]}", "loads[0].group"),
+        ("{group: symx, force: [0, 9]}", "loads[0].group"),
+    ],
+)
+def test_what_acts_on_faces_of_no_area(acting, key):
+    """Refused on the axis alone; beside other faces, those on the axis add nothing."""
+    place = "loads: [" if "loads" in key else "supports:\n  - "
+
+    def acted(group):
+        mark = ", " if "loads" in key else "\n  - "
+        text = {place: f"{place}{acting.replace('symx', group)}{mark}"}
+        return simulate(case(**text), mesh("QUAD4", "QUAD8", 0.0))
+
+    with pytest.raises(InputError) as refusal:
+        acted("symx")
+    said = f"{key} = 'symx': all of its faces lie on the axis: they have no area"
+    assert said in str(refusal.value)
+    one, both = (acted(group).displacement for group in ("farx", "[symx, farx]"))
+    np.testing.assert_array_equal(one, both)
+
+
 def test_a_plane_mesh_needs_to_say_what_it_is():
     with pytest.raises(InputError, match=r"this key is needed \(strain, stress or axisymmetric\)"):
         simulate(case(**{"plane: axisymmetric\n": ""}), mesh("QUAD4", "QUAD8", 0.0))

@@ -71,7 +71,6 @@ contact:
     assert abs(force[0]) == pytest.approx(0.2 * 50.0, rel=1e-8)
 
 
-
 def test_a_gap_that_lifts_a_free_body_counts_as_another():
     """One face on a rigid parabola: its gap brings up no force, and is zero all the same."""
     text = """

@@ -3,9 +3,9 @@
 import signal
 from collections.abc import Iterator
 from copy import deepcopy
-from dataclasses import dataclass
 from random import Random
 from types import FrameType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,23 +20,27 @@ UNITS = 1e6
 # Pressures and tractions are the same up to this share of the largest pressure of all steps, or so
 # many times what the solve itself says that rounding may change.
 SAME, ROUNDINGS = 1e-8, 10.0
+# A zone whose largest pressure is below this share of the largest of all bears nothing.
+LEAST = 1e-9
 # A solve takes less than a second.
 MOST_SECONDS = 60
+NOTHING = np.zeros(0)
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What came of a view: a word, its reason, and the pressures and tractions (m,) in order.
+class Seen(NamedTuple):
+    """What came of a view: a word and its reason, and the pressures and tractions (m,) in order.
 
-    `size`: the largest pressure of all steps; `rounding`: its estimated relative error.
+    `moved` (n,): how far nodes moved, less where a zone bears nothing, so that a body may rest
+    anywhere. `size`: the largest pressure of all steps; `rounding`: its estimated relative error.
     """
 
     word: str
-    reason: str
-    pressure: np.ndarray
-    traction: np.ndarray
-    size: float
-    rounding: float
+    reason: str = ""
+    pressure: np.ndarray = NOTHING
+    traction: np.ndarray = NOTHING
+    moved: np.ndarray = NOTHING
+    size: float = 1.0
+    rounding: float = 0.0
 
 
 def views(case: Case) -> Iterator[tuple[str, Case, bool]]:
@@ -82,20 +86,19 @@ def in_other_units(case: Case) -> Case:
 
 def seen(case: Case, everything: bool = False, unit: float = 1.0) -> Seen:
     """Solve a case; only a traceback is no answer, or no end in a minute."""
-    none = np.zeros(0)
     before = signal.signal(signal.SIGALRM, _too_long)
     signal.alarm(MOST_SECONDS)
     try:
         solved = solve_case(case, everything=everything)
     except InputError as error:
-        return Seen("refused", str(error), none, none, 1.0, 0.0)
+        return Seen("refused", str(error))
     except SolveError as error:
-        return Seen("no solution", str(error), none, none, 1.0, 0.0)
+        return Seen("no solution", str(error))
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
     causes = solved.solution.quality.accuracy.values()
-    values = solved.pressure / unit, _tractions(solved) / unit
+    values = solved.pressure / unit, _tractions(solved) / unit, _moved(solved)
     size = max(solved.solution.largest_pressure / unit, np.finfo(float).tiny)
     return Seen(solved.verdict, solved.reason, *values, size, max(causes, default=0.0))
 
@@ -113,6 +116,14 @@ def _tractions(solved: Solved) -> np.ndarray:
     return np.concatenate([np.zeros(0), *(np.linalg.norm(each, axis=1) for each in found)])
 
 
+def _moved(solved: Solved) -> np.ndarray:
+    """How far nodes moved, in the order of that."""
+    least = LEAST * solved.solution.largest_pressure
+    if any(zone.multiplier.max(initial=0.0) <= least for zone in solved.solution.zones):
+        return NOTHING
+    return np.sort(np.linalg.norm(solved.displacement, axis=1))
+
+
 def compared(case: Case) -> tuple[str, list[str]]:
     """The word of a case, and what differs between its views; empty where nothing does."""
     first, found = seen(case), list[str]()
@@ -127,10 +138,11 @@ def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
         yield f"{one.word} ({one.reason}) and {other.word} ({other.reason})"
         return
     allowed = max(SAME, ROUNDINGS * max(one.rounding, other.rounding))
-    for quantity in ("pressure", "traction"):
+    sizes = {"pressure": one.size, "traction": one.size, "moved": one.moved.max(initial=0.0)}
+    for quantity, size in sizes.items():
         a, b = (getattr(each, quantity) for each in (one, other))
         if view == "renumbered":
             a, b = np.sort(a), np.sort(b)
-        apart = float(np.abs(a - b).max(initial=0.0)) / one.size
+        apart = float(np.abs(a - b).max(initial=0.0)) / (size or 1.0)
         if apart > allowed:
             yield f"{quantity} by {apart:.1e}"

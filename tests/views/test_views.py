@@ -11,7 +11,7 @@ from solver.lac import reconstruction
 from solver.lac.errors import SolveError
 from solver.mechanics.linear import condensation
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation.equilibrium import friction_recovery
+from solver.simulation.equilibrium import contact_stiffness, friction_recovery
 from solver.simulation.equilibrium.friction import Search
 from solver.simulation.equilibrium.problem import ContactProblem
 
@@ -73,6 +73,7 @@ PLANTED = {
     "pivots": (condensation, "_GOOD_PIVOT", 1e-6),
     "rest": (Search, "_resting", no_rest),
     "smooth": (CoulombContact, "_from_smooth", lambda _contact, _start: None),
+    "lifts": (contact_stiffness, "_LEAST", 0.0),
     "stabilised": (ContactProblem, "__init__", from_anywhere(ContactProblem.__init__)),
 }
 

@@ -73,8 +73,8 @@ class CoulombContact:
     """The contact of m gaps and of f macro-elements with friction, which slip along k tangents.
 
     `stiffness` S (r, r), symmetric, a matrix or a product: rows of the gaps come first; `diagonal`
-    (r,) is about that of S, positive; `friction` μ (f,); `of` (f,): the gap each one has; `rows` (k, f):
-    those of its slips, by tangent, in any order.
+    (r,), positive, is about that of S; `friction` μ (f,); `of` (f,): the gap each one has; `rows`
+    (k, f): those of its slips, by tangent, in any order.
     """
 
     def __init__(

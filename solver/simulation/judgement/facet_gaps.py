@@ -66,9 +66,11 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
         if missed is None:
             continue
         if not pushed[mine].any():
-            left = state.gap[mine][zone.operator.covered > 0].min(initial=np.inf)
-            peak = float(missed.depth.max()) / _MEAN[1]
-            depth = max(depth, peak / left if left > 0 else 0.0)
+            met = zone.operator.covered > 0
+            left = state.gap[mine][met]
+            if (left > state.trial.gap_limit[mine][met]).all():
+                peak = float(missed.depth.max()) / _MEAN[1]
+                depth = max(depth, peak / float(left.min(initial=np.inf)))
             continue
         gaps[mine] = missed.gap
         if closing > 0:

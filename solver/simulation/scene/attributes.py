@@ -232,7 +232,7 @@ class Attributes(CutGroups):
             share[nodes] = 1 / len(nodes)
             return share
         along = self.field((1.0, *[0.0] * (self.points.shape[1] - 1)))
-        for name, nodes in self.faces(load.group, key):
+        for name, nodes in self.faces_with_area(load.group, key):
             force = face_forces(self.points, nodes, name, along, False, self.axisymmetric)
             share += force[:, 0]
         return share / share.sum()
@@ -240,7 +240,7 @@ class Attributes(CutGroups):
     def _loaded(self, load: Load, key: str) -> list[tuple[str, np.ndarray]]:
         """The cells or faces that a load acts on: (type, nodes)."""
         if load.kind != "body_force":
-            return self.faces(load.group, key)
+            return self.faces_with_area(load.group, key)
         if load.group == ALL:
             return list(self.cut.cells.items())
         mask = self.cell_mask(load.group)

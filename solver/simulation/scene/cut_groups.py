@@ -28,6 +28,8 @@ from ...mechanics.mortar.treatments import TREATMENTS
 from ...system.errors import InputError
 from .groups import ALL
 
+_NO_AREA = "lie on the axis: they have no area"
+
 
 @dataclass(frozen=True)
 class CutZone:
@@ -89,6 +91,16 @@ class CutGroups:
         """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
         blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
         return [(block.type.name, block.nodes) for block in blocks]
+
+    def faces_with_area(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
+        """The faces of a group that do not lie on the axis of revolution; refused without any."""
+        found = self.faces(group, key)
+        if not self.axisymmetric:
+            return found
+        found = [(name, nodes[(self.points[nodes, 0] != 0).any(axis=1)]) for name, nodes in found]
+        if not sum(len(nodes) for _, nodes in found):
+            raise InputError(self.case.path, key, group, f"all of its faces {_NO_AREA}")
+        return found
 
     def as_cut(self, faces: Sequence[FaceBlock]) -> list[FaceBlock]:
         """The faces as meshed, slave faces replaced by their sub-faces."""
@@ -208,7 +220,7 @@ def _refuse_on_axis(case: Case, mesh: meshio.Mesh, i: int, slave: list[FaceBlock
     for block in slave:
         ends = mesh.points[block.nodes[:, : block.type.n_vertices], 0] == 0
         if flat := int(ends.all(axis=1).sum()):
-            allowed = f"{flat} of its faces lie on the axis: they have no area"
+            allowed = f"{flat} of its faces {_NO_AREA}"
             raise InputError(case.path, case.zone_key(i, "slave"), zone.slave, allowed)
         if ends.any() and zone.treatment == "node_to_segment" and block.type.order == 2:
             allowed = (

@@ -56,7 +56,7 @@ def _spring(
     along = None if axis < 0 else np.eye(points.shape[1])[axis]
     return sum(
         foundation(points, nodes, name, stiffness, along, groups.axisymmetric)
-        for name, nodes in groups.faces(group, key)
+        for name, nodes in groups.faces_with_area(group, key)
     )
 
 
