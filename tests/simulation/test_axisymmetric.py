@@ -155,6 +155,20 @@ def test_contact_of_the_macro_element_at_the_axis():
     assert area == pytest.approx(np.pi * 0.0625 * np.array([1, 0, 4]), abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("closed", "units"),
+    [([1], (3, 0, 9)), ([0, 2], (6, 0, 16)), ([0, 1, 3], (11, 1, 16)), ([1, 2], (8, 0, 16))],
+)
+def test_contact_of_single_macro_elements_is_between_none_and_all(closed, units):
+    """Rings of 1, 3, 5, 7 times π/16; each edge is known to its ring and to the open one beside."""
+    scene = build_scene(case(), mesh("QUAD4", "QUAD4", 0.0))
+    [zone] = scene.zones
+    order = np.argsort(zone.operator.surface.centre[:, 0])
+    status = np.isin(np.arange(4), order[closed])
+    _, area = _extent(scene, zone, 25.0 * status, status)
+    assert area == pytest.approx(np.pi / 16 * np.array(units), abs=1e-12)
+
+
 def test_r_is_the_radius_in_expressions():
     """A pressure of 25 r² presses with ∫ 25 r² 2πr dr = 12.5 π on the disc of radius 1."""
     uneven = case(**{"pressure: 25.0": "pressure: 25*r**2"})

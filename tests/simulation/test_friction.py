@@ -88,10 +88,20 @@ def test_products_in_place_of_a_matrix_find_the_same_state(monkeypatch):
         np.testing.assert_allclose(one, other, atol=1e-11 * np.abs(other).max())
 
 
+def test_what_is_at_its_bound_and_does_not_move_sticks():
+    """Of three pressed by 2 and held by 1, μ = 1/2, the last one slips."""
+    rows, one = np.array([[3, 4, 5]]), np.ones(6)
+    contact = CoulombContact(np.eye(6), one, one[:3] / 2, np.arange(3), rows)
+    forces, jump = np.array([2.0, 2, 2, 1, 1, 1]), np.array([0, 0, 0, 0, -1e-14, -1e-6])
+    closed, slips = contact.statuses(forces, jump)
+    assert closed.all()
+    assert slips.tolist() == [False, False, True]
+
+
 def test_newton_finds_no_state_where_nothing_balances_the_force():
     """Pressed by 2 and pulled by 5, μ = 0.1, and no stiffness along the face."""
     contact = CoulombContact(
-        np.diag([1.0, 0.0]), np.array([1.0, 0.0]), np.array([0.1]), np.array([0]), np.array([[1]])
+        np.diag([1.0, 0.0]), np.array([1.0, 0.1]), np.array([0.1]), np.array([0]), np.array([[1]])
     )
     assert contact.solve(np.array([2.0, 5.0])) is None
 

@@ -32,6 +32,8 @@ _LATE, _ROUNDED = 15, 1e-6
 _OPEN = 1e-6
 # Below this share of the forces at work forces are round-off.
 _NOTHING = 1e-12
+# Slips that would bring up less than this share of the largest force are rounding.
+_STUCK = 1e-10
 # Imposed gaps that would bring up so many times the forces lose digits of these.
 _WIDE = 1e4
 # A coefficient with which all that is closed sticks.
@@ -262,13 +264,14 @@ class CoulombContact:
 
         Of a pair that the law makes complementary the larger one decides, in one unit: closed where
         the force is more than what the gap would bring up, slip where the slip's is more than what
-        is spare of the bound.
+        is spare of the bound. What is at its bound and moves by rounding alone sticks.
         """
         m, unit = self.m, self.c * jump
+        none = _STUCK * np.abs(forces).max(initial=0.0)
         closed = forces[:m] > unit[:m]
         along, far = (np.linalg.norm([v[r] for r in self.rows], axis=0) for v in (forces, unit))
         bound = self.friction * np.maximum(forces[:m][self.of], 0.0)
-        return closed, closed[self.of] & (far > bound - along)
+        return closed, closed[self.of] & (far > bound - along + none)
 
     def _length(self, z: np.ndarray, step: np.ndarray, law: _Law) -> float:
         """The share of a step that lowers the fault; all of it where none does."""

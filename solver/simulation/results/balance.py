@@ -316,7 +316,9 @@ def _extent(
         at = surface_points(points, [(b.type.name, b.nodes, b.number) for b in zone.slave_faces])
         length = np.bincount(at.macro, at.weight)
         edges = contact_edges(points, ends, length, whole, mean, closed, around)
-        return edges, surface.covered[closed].sum() + edges.lengths.sum(axis=0)
+        areas = np.where(closed, surface.covered, 0.0)[:, None].repeat(3, axis=1)
+        np.add.at(areas, edges.macro, edges.lengths)  # that ends on both sides: two edges
+        return edges, np.minimum(np.maximum(areas, 0.0).sum(axis=0), surface.covered.sum())
     if closed.all() or not closed.any():
         return None, np.full(3, surface.covered[closed].sum())
     near = vertex_neighbours(faces, len(closed)).astype(int)
