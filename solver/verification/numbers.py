@@ -120,16 +120,13 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     )
     bound, far = mu * zone.multiplier, np.linalg.norm(slip, axis=1)
     gone = np.linalg.norm(zone.friction.slip_total, axis=1)
-    length = solution.scalars.length
-    caused = stress_of_motion(solution.case, length, solution.displacement)
-    least = mu * max(_LITTLE * solution.largest_pressure, _LITTLE_OF_MOTION * caused)
-    largest = max(float(bound.max()), least) or 1.0
+    little = _little_pressure(solution)
+    largest = max(float(bound.max()), mu * little) or 1.0
     farthest = max(float(far.max()), _LITTLE * float(gone.max())) or 1.0
     size = np.linalg.norm(traction, axis=1)
     apart = traction * far[:, None] - bound[:, None] * slip
     work = np.array([step.dissipation for step in solution.steps])
-    way = float(gone.max(initial=_NO_WAY * length))
-    most = max(float(np.abs(work).sum()), least * float(zone.area.sum()) * way)
+    most = max(float(np.abs(work).sum()), _little_work(solution, little))
     rows = {
         "traction beyond μp of": np.maximum(size - bound, 0.0) / largest,
         "traction without contact on": np.where(status == 0, size, 0.0) / largest,
@@ -140,6 +137,23 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     places = [f"{what} {i}" for what, values in rows.items() for i in range(len(values))]
     values = np.concatenate(list(rows.values()))
     return Sample(values, np.zeros(len(values)), lambda i: places[i])
+
+
+def _little_pressure(solution: Solution) -> float:
+    """The pressure by which the law is judged where hardly anything presses."""
+    caused = stress_of_motion(solution.case, solution.scalars.length, solution.displacement)
+    return max(_LITTLE * solution.largest_pressure, _LITTLE_OF_MOTION * caused)
+
+
+def _little_work(solution: Solution, pressure: float) -> float:
+    """The work of friction of that pressure along the slips of all zones."""
+    found = 0.0
+    for zone in solution.zones:
+        if zone.friction is not None:
+            gone = np.linalg.norm(zone.friction.slip_total, axis=1)
+            way = float(gone.max(initial=_NO_WAY * solution.scalars.length))
+            found += solution.case.zone_named(zone.name).friction * float(zone.area.sum()) * way
+    return pressure * found
 
 
 def at_positions(quantity: str) -> Sampler:

@@ -13,7 +13,7 @@ from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.stress import largest_strain
 from solver.mesh import generate, transform
 from solver.simulation.equilibrium.problem import ContactProblem
-from solver.simulation.equilibrium.state import Accuracy
+from solver.simulation.equilibrium.state import Accuracy, estimate, rounding
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
@@ -21,7 +21,7 @@ from solver.studies.digits import exact_state
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from solver.verification.run import mesh_of
-from tests.scenes import POISSON, YOUNG, block_mesh, changed_case, with_points
+from tests.scenes import POISSON, YOUNG, block_case, block_mesh, changed_case, with_points
 from tests.studies.measured import STABILITY, point
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -205,3 +205,18 @@ contact: [{name: interface, slave: bottom_contact, master: top_contact}]
     assert ((covered > 0) & (covered < 1e-12)).any()
     trial = problem.solve(1.0).trial
     assert trial.pressure_limit.max() < 1e-9 * trial.pressure.max()
+
+
+def test_a_pressure_that_is_rounding_is_judged_by_what_loads_cause():
+    """Where bodies touch and nothing presses; a pressure that is small has lost its digits."""
+    assembled = ContactProblem(build_scene(block_case(2), block_mesh("QUAD4", "TRIA3")))
+    state, left = assembled.solve(1.0), 1e-9
+
+    def error(share):
+        about = state.iterate, rounding(state.iterate), share * state.pressure, assembled.diagonal
+        return estimate(*about, assembled._rough, left, state.force_scale).estimate
+
+    assert left / 10 < error(1.0) < 10 * left
+    assert error(1e-5) > 1e4 * error(1.0)
+    assert error(1e-11) < 10 * left
+    assert error(1e-16) < 10 * left

@@ -1,5 +1,6 @@
 """States of friction that Newton's method finds by a way of its own."""
 
+from copy import deepcopy
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from solver.case.reader import parse_case
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.scene.scene import build_scene
+from solver.verification.checks import run_checks
 from solver.verification.run import mesh_of
 from tests.scenes import circle_on_block, solved
 
@@ -26,8 +28,9 @@ def test_a_free_punch_that_is_pressed_in_finds_its_place(friction):
     assert abs(force[0]) < 1e-9 * abs(force[1])
 
 
-def test_a_block_between_two_slides_after_it_was_pressed():
-    """Pressed, then pulled by far more than it can stick: the cap goes along, the lower one not."""
+@pytest.fixture(scope="module")
+def between():
+    """A block pressed, then pulled by far more than it can stick: the cap goes along."""
     bricks = {
         "low": (0.0, 60.0, "QUAD4"),
         "mid": (10.0, 20.0, "QUAD8"),
@@ -63,12 +66,28 @@ contact:
   - {{name: one, slave: mu, master: lt, friction: 0.2}}
   - {{name: two, slave: cu, master: mt, friction: 0.6}}
 """
-    found = solved(text)
-    one, two = found.zones
+    return solved(text)
+
+
+def test_a_block_between_two_slides_after_it_was_pressed(between):
+    one, two = between.zones
     assert (one.friction.status == 2).all()
     assert (two.friction.status == 1).all()
-    force = found.steps[-1].resultants["one"].force
+    force = between.steps[-1].resultants["one"].force
     assert abs(force[0]) == pytest.approx(0.2 * 50.0, rel=1e-8)
+
+
+@pytest.mark.parametrize(("work", "passes"), [(-1e-16, True), (-1e-3, False)])
+def test_work_where_nothing_presses_is_judged_by_the_slips_of_all_zones(between, work, passes):
+    """Zone `two` has no slip of its own; the work of a step is that of both."""
+    left = deepcopy(between)
+    for zone in left.zones:
+        zone.multiplier[:], zone.friction.friction_traction[:] = 0.0, 0.0
+    for step in left.steps:
+        step.dissipation = 0.0
+    left.steps[-1].dissipation = work
+    law = [check for check in run_checks(left) if check.name == "friction_law"]
+    assert [check.passed for check in law] == [passes, passes]
 
 
 def test_a_gap_that_lifts_a_free_body_counts_as_another():

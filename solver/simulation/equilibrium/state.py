@@ -247,7 +247,7 @@ def estimate(
 
 
 def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float) -> float:
-    """What strains and motions would be, where the largest `pressure` is rounding; 0 elsewhere."""
+    """What loads, strains or motions cause, where the largest `pressure` is rounding; else 0."""
     scene, at_rest = iterate.scene, _at_rest(iterate) > 0
     stress = stress_at_rest(scene, iterate.displacement.total)
     loaded = np.full(scene.points.size, scene.loads.at_work.force)
@@ -255,7 +255,7 @@ def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float) -> fl
     nothing = AT_REST * max(of_others, stress if at_rest else 0.0)
     if pressure <= nothing or (at_rest and error >= pressure):
         return max(of_others, stress, iterate.sizes.highest)
-    return 0.0
+    return of_others if error >= pressure else 0.0
 
 
 def _at_rest(iterate: ContactIterate) -> float:

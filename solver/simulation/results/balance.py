@@ -96,7 +96,7 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
             found[name] = found.get(name, 0.0) + left
             break  # what both of them hold is not distinguished
     for part, term in zip(state.iterate.scene.parts, state.iterate.terms, strict=True):
-        if np.any(term.ground):
+        if part.holder:
             found[part.holder] = found.get(part.holder, 0.0) - term.ground
     at_nodes = sum(found.values(), np.zeros_like(left))
     return [_resultant(scene, name, force) for name, force in found.items()], at_nodes
