@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from solver.mechanics.linear import systems
+from solver.mechanics.linear.stabilised import Compliance
 from solver.mechanics.mortar.coulomb import CoulombContact
+from solver.simulation.equilibrium import problem
 from solver.simulation.judgement import validity
 from solver.simulation.results import results
 from solver.simulation.scene import operators
@@ -117,6 +119,14 @@ def _slips_of_all(true: Any) -> Any:
     return result
 
 
+def _pressures_among_forces(true: Any) -> Any:
+    def compliance(scene: Scene, *more: Any) -> Compliance:
+        found, area = true(scene, *more), scene.zones[0].operator.area.mean()
+        return Compliance(found.scatter / area, found.weight * area**2)
+
+    return compliance
+
+
 FAULTS = (
     Fault(
         "frames-of-nodes",
@@ -201,5 +211,14 @@ FAULTS = (
         operators,
         "_initial_gaps",
         _interference_lost_with_rigid,
+    ),
+    Fault(
+        "pressures-among-forces",
+        "what scatters is rounded as a pressure, beside forces",
+        {"stabilised": "yes", "form": "other units"},
+        problem,
+        "compliance_of",
+        _pressures_among_forces,
+        "solid",
     ),
 )

@@ -28,7 +28,7 @@ _STEPS: dict[str, dict[str, Any]] = {
 _FORMS: dict[str, dict[str, Any]] = {
     "renumbered": {"transform": {"renumber": 3}},
     "perturbed": {"transform": {"perturb": 0.1}},
-    "other units": {"units": {"length": "m", "stress": "kPa"}},
+    "other units": {"units": {"length": "km", "stress": "GPa"}},
 }
 _MULTIPLIED = {
     *("fix", "move", "pressure", "traction", "force", "body_force", "strain", "temperature"),

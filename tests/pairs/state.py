@@ -68,7 +68,7 @@ class States:
         self.dim = 3 if row["space"] == "solid" else 2
         self.axisymmetric = row["space"] == "axisymmetric"
         self.start = 1.0 if self.axisymmetric else 0.0  # of x
-        self.unit = 1e3 if row["form"] == "other units" else 1.0
+        self.unit = 1e-3 if row["form"] == "other units" else 1.0
         self.normal = self._up()
         if row["interface"] == "tilted":
             self.normal = self._up() - 0.2 * np.eye(self.dim)[0]
@@ -84,7 +84,7 @@ class States:
                 turn = turn @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
         if row["form"] == "far":
             origin[:] = [0.0, 100.0] if self.axisymmetric else 100.0
-        self.placed = Placed(turn, origin, 0.001 if row["form"] == "other units" else 1.0)
+        self.placed = Placed(turn, origin, 1e-6 if row["form"] == "other units" else 1.0)
         self.second = row["second zone"] != "none"
         self.bodies = list(self._states())
 

@@ -10,14 +10,16 @@ from ..scene.scene import Scene
 def compliance_of(scene: Scene, normal: np.ndarray, closed: np.ndarray) -> Compliance:
     """The compliance of the closed rows (k,), of which those of gaps are `normal` (k,).
 
-    Zones without one have no part of it, and rows of slip do not give way.
+    Zones without one have no part of it, and rows of slip do not give way. What scatters is counted
+    as forces, pressures times areas: it is rounded beside the other forces.
     """
     parts, weight = [], [np.empty(0)]
     for zone in scene.zones:
         mine, recovery = closed[zone.numbers], zone.operator.recovery
         if zone.zone.stabilised and recovery and recovery.stabilisation:
-            parts.append(recovery.stabilisation.scatter(mine))
-            weight.append(recovery.stabilisation.weight[mine])
+            area = zone.operator.area[mine]
+            parts.append(sparse.diags(area) @ recovery.stabilisation.scatter(mine))
+            weight.append(recovery.stabilisation.weight[mine] / area**2)
         else:
             parts.append(sparse.csr_matrix((0, int(mine.sum()))))
     parts.append(sparse.csr_matrix((0, int(closed[~normal].sum()))))
