@@ -25,9 +25,10 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 # Iterations, and the fault of the law by the largest force that ends them: at once, or where it
-# falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits.
+# falls no more; from so many on a larger one, as of a stiff slave, whose S has lost digits. There
+# each step gains little: as long as it gains there may be more iterations.
 _MOST, _EXACT, _ENOUGH, _STALLED = 60, 1e-13, 1e-9, 0.3
-_LATE, _ROUNDED = 15, 1e-6
+_LATE, _ROUNDED, _LONGEST = 15, 1e-6, 300
 # Forces below this share of those that close everything are as good as none.
 _OPEN = 1e-6
 # Below this share of the forces at work forces are round-off.
@@ -211,12 +212,14 @@ class CoulombContact:
         The forces `start` (r,) are those at the jumps `at` (r,).
         """
         best, exact = np.inf, _EXACT if isinstance(self.stiffness, np.ndarray) else _INEXACT
-        for count in range(_MOST):
+        for count in range(_LONGEST):
             law = self._law(z, start + self.stiffness @ (z - at))
             fault = float(np.abs(law.fault).max(initial=0.0))
             enough = _ENOUGH if count < _LATE else _ROUNDED
             if fault < exact or (fault < enough and fault > _STALLED * best):
                 return law, z, count
+            if count >= _MOST and fault >= best:
+                return None
             best = min(best, fault)
             if not np.isfinite(step := self._step(law)).all():
                 return None
