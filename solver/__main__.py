@@ -24,12 +24,6 @@ from pathlib import Path
 with suppress(OSError):
     sys.path[:] = [folder for folder in sys.path if Path(folder) != Path.cwd()]
 
-import signal
-
 from .commands.cli import main
 
-status = main()
-# The command has ended. Ctrl-C while Python exits would add a traceback of its exit handlers.
-if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-sys.exit(status)
+sys.exit(main())

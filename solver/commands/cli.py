@@ -9,10 +9,12 @@ import argparse
 import io
 import os
 import platform
+import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -98,33 +100,44 @@ _OF_WORKFLOW = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by default that of this process; the exit status."""
-    if arguments is None:
-        # Lines leave as they are written, so that the last line of a log is what was said last.
-        if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(line_buffering=True)
-        # An unsound result is refused in one line: earlier warnings of libraries add nothing.
-        if not sys.warnoptions:
-            warnings.simplefilter("ignore")
-    options = argparse.Namespace()
+    with _own_process() if arguments is None else nullcontext():
+        options = argparse.Namespace()
+        try:
+            options = _parse(sys.argv[1:] if arguments is None else arguments)
+            if options.threads:
+                limit_threads(options.threads)
+            return options.run(options)
+        except InputError as error:
+            print(error, file=sys.stderr)
+            return REFUSED
+        except SolveError as error:
+            case = getattr(options, "case", None)
+            print(f"{case}: {error}" if case else error, file=sys.stderr)
+            return NO_RESULT
+        except KeyboardInterrupt:
+            return INTERRUPTED
+        except BrokenPipeError:  # the reader of our output has gone, as `head` does
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return PASSED
+        except Exception as error:  # noqa: BLE001 -- status 1, Python's own, means a failed check
+            return _unexpected(error)
+
+
+@contextmanager
+def _own_process() -> Iterator[None]:
+    """What holds for a process that is for one command alone."""
+    # Lines leave as they are written, so that the last line of a log is what was said last.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
+    # An unsound result is refused in one line: earlier warnings of libraries add nothing.
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
     try:
-        options = _parse(sys.argv[1:] if arguments is None else arguments)
-        if options.threads:
-            limit_threads(options.threads)
-        return options.run(options)
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return REFUSED
-    except SolveError as error:
-        case = getattr(options, "case", None)
-        print(f"{case}: {error}" if case else error, file=sys.stderr)
-        return NO_RESULT
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return PASSED
-    except Exception as error:  # noqa: BLE001 -- status 1, Python's own, means a failed check
-        return _unexpected(error)
+        yield
+    finally:
+        # Ctrl-C while Python exits would add a traceback of its exit handlers.
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _unexpected(error: Exception) -> int:

@@ -124,11 +124,10 @@ def test_refusals_on_and_beyond_the_axis():
 )
 def test_what_acts_on_faces_of_no_area(acting, key):
     """Refused on the axis alone; beside other faces, those on the axis add nothing."""
-    place = "loads: [" if "loads" in key else "supports:\n  - "
+    first, then = ("loads: [", ", ") if "loads" in key else ("supports:\n  - ", "\n  - ")
 
     def acted(group):
-        mark = ", " if "loads" in key else "\n  - "
-        text = {place: f"{place}{acting.replace('symx', group)}{mark}"}
+        text = {first: f"{first}{acting.replace('symx', group)}{then}"}
         return simulate(case(**text), mesh("QUAD4", "QUAD8", 0.0))
 
     with pytest.raises(InputError) as refusal:

@@ -30,8 +30,9 @@ NOTHING = np.zeros(0)
 class Seen(NamedTuple):
     """What came of a view: a word and its reason, and the pressures and tractions (m,) in order.
 
-    `moved` (n,): how far nodes moved, less where a zone bears nothing, so that a body may rest
-    anywhere. `size`: the largest pressure of all steps; `rounding`: its estimated relative error.
+    `moved` (n,): how far nodes moved, in the order of that; empty where a zone bears nothing, so
+    that a body may rest anywhere. `size`: the largest pressure of all steps; `rounding`: its
+    estimated relative error.
     """
 
     word: str
@@ -117,7 +118,7 @@ def _tractions(solved: Solved) -> np.ndarray:
 
 
 def _moved(solved: Solved) -> np.ndarray:
-    """How far nodes moved, in the order of that."""
+    """See `Seen`."""
     least = LEAST * solved.solution.largest_pressure
     if any(zone.multiplier.max(initial=0.0) <= least for zone in solved.solution.zones):
         return NOTHING
@@ -138,7 +139,9 @@ def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
         yield f"{one.word} ({one.reason}) and {other.word} ({other.reason})"
         return
     allowed = max(SAME, ROUNDINGS * max(one.rounding, other.rounding))
-    sizes = {"pressure": one.size, "traction": one.size, "moved": one.moved.max(initial=0.0)}
+    sizes = {"pressure": one.size, "traction": one.size}
+    if one.moved.size and other.moved.size:
+        sizes["moved"] = float(one.moved.max())
     for quantity, size in sizes.items():
         a, b = (getattr(each, quantity) for each in (one, other))
         if view == "renumbered":

@@ -69,7 +69,11 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 """
 
 
-@pytest.mark.parametrize("command", [START[2:], SOLVER[1:]], ids=["Snakemake", "solver"])
+@pytest.mark.parametrize(
+    "command",
+    [START[2:], SOLVER[1:], [SOLVER[1], "--help"]],
+    ids=["Snakemake", "solver", "help"],
+)
 def test_ctrl_c_while_python_exits_prints_no_traceback(command):
     run = [sys.executable, "-c", INTERRUPTED_AT_EXIT, *command]
     ended = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=False)

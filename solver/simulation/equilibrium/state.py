@@ -241,21 +241,20 @@ def estimate(
         "slender": unit * iterate.sizes.slender,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
-    if max(errors.values()) > 10.0**-LEAST_DIGITS * scale:
-        scale = max(scale, _scale_of_rest(iterate, scale, max(errors.values())))
+    if (worst := max(errors.values())) > 10.0**-LEAST_DIGITS * scale:
+        loaded = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
+        scale = max(scale, _scale_of_rest(iterate, scale, worst, loaded))
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
-def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float) -> float:
-    """What loads, strains or motions cause, where the largest `pressure` is rounding; else 0."""
-    scene, at_rest = iterate.scene, _at_rest(iterate) > 0
-    stress = stress_at_rest(scene, iterate.displacement.total)
-    loaded = np.full(scene.points.size, scene.loads.at_work.force)
-    of_others = pressure_of_forces(iterate.constraints.moving[iterate.closed], loaded)
-    nothing = AT_REST * max(of_others, stress if at_rest else 0.0)
+def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float, loaded: float) -> float:
+    """What loads (`loaded`), strains or motions cause where the `pressure` is rounding; else 0."""
+    at_rest = _at_rest(iterate) > 0
+    stress = stress_at_rest(iterate.scene, iterate.displacement.total)
+    nothing = AT_REST * max(loaded, stress if at_rest else 0.0)
     if pressure <= nothing or (at_rest and error >= pressure):
-        return max(of_others, stress, iterate.sizes.highest)
-    return of_others if error >= pressure else 0.0
+        return max(loaded, stress, iterate.sizes.highest)
+    return loaded if error >= pressure else 0.0
 
 
 def _at_rest(iterate: ContactIterate) -> float:
