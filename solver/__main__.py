@@ -4,8 +4,12 @@ By its path with the option -P, no module of the current folder is imported: `-m
 first, and a file `re.py` or `enum.py` there would join it.
 """
 
+import signal
 import sys
 
+# Ctrl-C ends this process at once while Python imports: a traceback of there tells nothing.
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 if not __package__:
     from importlib.util import module_from_spec, spec_from_file_location
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -61,6 +62,29 @@ def test_a_full_disk_is_2_with_one_line_and_leaves_nothing(case, tmp_path, capsy
     assert main(solve(case, out)) == 0
 
 
+@pytest.mark.parametrize("suffix", [".vtkhdf", ".msh", ".MSH", ".med", ".vtu", ".inp"])
+def test_a_full_disk_leaves_no_part_of_a_mesh(case, tmp_path, suffix, capsys):
+    file = tmp_path / "out" / f"m{suffix}"
+    with small_disk(file.parent, 4):
+        (file.parent / "fill").write_bytes(bytes(3 << 10))
+        assert main(["mesh", str(case), "-o", str(file)]) == 2
+        assert capsys.readouterr().err == f"{file}: No space left on device\n"
+        assert [left.name for left in file.parent.iterdir()] == ["fill"]
+
+
+def test_what_cannot_be_kept_is_named(case, tmp_path, capsys):
+    out = tmp_path / "out"
+    with small_disk(out, 4):
+        (out / "fill").write_bytes(bytes(4 << 10))
+        assert main(["export", str(case), "--code", "calculix", "-o", str(out / "deck")]) == 2
+        assert capsys.readouterr().err == f"{out / 'deck'}: No space left on device\n"
+        drawn = ["-o", str(tmp_path / "r.vtkhdf"), "--pictures", str(out)]
+        assert main(["solve", str(case), *drawn]) == 0
+        assert re.search(f"^no pictures: {out}/.*No space left", capsys.readouterr().out, re.M)
+    assert main(["solve", str(case), *drawn[2:]]) == 2
+    assert capsys.readouterr().err == f"--pictures: folder = '{out}': needs a result: add -o\n"
+
+
 def test_a_folder_or_mesh_without_permission_is_2_with_one_line(case, tmp_path):
     mesh, out = tmp_path / "m.vtkhdf", tmp_path / "out"
     assert main(["mesh", str(case), "-o", str(mesh)]) == 0
@@ -69,6 +93,8 @@ def test_a_folder_or_mesh_without_permission_is_2_with_one_line(case, tmp_path):
     assert refused.returncode == 2
     assert refused.stderr == f"{out / 'v.json'}: Permission denied\n"
     assert list(out.iterdir()) == []
+    refused = run(["mesh", str(case), "-o", str(out / "m.msh")])
+    assert refused.stderr == f"{out / 'm.msh'}: Permission denied\n"
     out.chmod(0o755)
     mesh.chmod(0)
     refused = run(solve(case, out, "--mesh", mesh))

@@ -14,7 +14,6 @@ A code is a folder, by whose name it is called, with a file of commands. The cod
 """
 
 import re
-import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +31,8 @@ from ..case.typed import Section, Text, Version, read_as
 from ..case.yaml import read_mapping
 from ..lac.cells.catalogue import cell_type
 from ..lac.errors import SolveError
-from ..system.errors import InputError, hint
+from ..system.errors import InputError, hint, of_machine
+from ..system.files import write_text
 from ..system.process import printed_by, run_in_subprocess
 from ..system.progress import now
 from ..verification.stored import write_verdict
@@ -294,7 +294,7 @@ def run_case(
                 case,
                 code.name,
                 known[0] if known else CRASHED,
-                str(error) if known else f"{type(error).__name__}: {error}",
+                str(error) if known else of_machine(error) or f"{type(error).__name__}: {error}",
                 version=version,
                 settings=code.settings,
                 seconds=now() - started,
@@ -303,7 +303,7 @@ def run_case(
             return verdict
         finally:
             if (said := Path(scratch, LOG)).is_file():
-                shutil.copyfile(said, folder / LOG)
+                write_text(folder / LOG, said.read_text(encoding="utf-8"))
 
 
 def _thin(found: ForeignResult) -> ForeignResult:

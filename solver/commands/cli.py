@@ -120,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return PASSED
         except Exception as error:  # noqa: BLE001 -- status 1, Python's own, means a failed check
-            return _unexpected(error)
+            return _unexpected(error, getattr(options, "output", None) or "output")
 
 
 @contextmanager
@@ -132,17 +132,20 @@ def _own_process() -> Iterator[None]:
     # An unsound result is refused in one line: earlier warnings of libraries add nothing.
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
+    # Ctrl-C ends a command, not Python while it imports the program or exits: there it would print
+    # a traceback.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
-        # Ctrl-C while Python exits would add a traceback of its exit handlers.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _unexpected(error: Exception) -> int:
+def _unexpected(error: Exception, output: object) -> int:
     """One line for what the machine lacks, a traceback for a bug."""
-    if reason := of_machine(error):
+    if reason := of_machine(error, output):
         print(reason, file=sys.stderr)
         return REFUSED if isinstance(error, OSError) else NO_RESULT
     traceback.print_exception(error)

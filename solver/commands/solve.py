@@ -1,13 +1,14 @@
 """The commands that solve a case, check its result again, and accept its values."""
 
 import argparse
-from contextlib import suppress
+import logging
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..system.errors import InputError
+from ..system.errors import InputError, of_machine
+from ..system.progress import OUTCOME
 from . import jobs
 from .cli import FAILED, PASSED, add_threads, print_checks
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from ..simulation.results.solution import Solution
     from ..verification.run import Job
     from ..verification.verdict import Verdict
+
+
+_LOG = logging.getLogger(__name__)
 
 
 def add_solve(command: argparse.ArgumentParser) -> None:
@@ -66,13 +70,14 @@ def run_solve(options: argparse.Namespace) -> int:
     from ..system.progress import details, report_outcomes
     from ..verification.run import solve
 
+    if options.pictures and not options.output:
+        raise InputError("--pictures", "folder", str(options.pictures), "needs a result: add -o")
     log = _silent if options.quiet else partial(print, flush=True)
     checked, everything = not options.no_memory_check, options.everything
     job = replace(_job(options), memory_check=checked, everything=everything)
     with details(options.verbose and not options.quiet), report_outcomes(log):
-        drawn = options.pictures and options.output
-        draw = partial(_draw, options.pictures, options.output.parent) if drawn else None
-        verdict = solve(job, options.output, options.verdict, draw)
+        drawn = options.pictures and partial(_draw, options.pictures, options.output.parent)
+        verdict = solve(job, options.output, options.verdict, drawn)
     return PASSED if verdict.sound else FAILED
 
 
@@ -86,12 +91,15 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict") -> None:
-    """Draw what the report shows of a solve; it draws what is missing, and says why it cannot."""
+    """Draw what the report shows of a solve; what is missing the report draws itself."""
     from ..report.pictures import draw_all
     from ..report.rows import Row
 
-    with suppress(Exception):
+    try:
         draw_all(Row(verdict, folder), pictures, solution)
+    except Exception as error:  # noqa: BLE001 -- the solve is what counts
+        reason = of_machine(error, pictures) or f"{type(error).__name__}: {error}"
+        _LOG.log(OUTCOME, "no pictures: %s", reason)
 
 
 def _silent(line: str) -> None:

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from .errors import InputError, printable
+
 # The last bytes of a sealed file; HDF5 leaves alone what follows its own end.
 _SEAL = b"\nsha256 %s\n"
 _SEAL_SIZE = len(_SEAL % (b"0" * 64))
@@ -17,12 +19,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """A temporary path in the same folder; it takes the place of `path` when the block ends well.
 
     The folder is made where it is missing. When the block raises, the temporary file goes and
-    `path` stays as it was; an OSError, as of a full disk, names `path`.
+    `path` stays as it was; an InputError, or an OSError as of a full disk, names `path`.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    # The suffix is kept: writers choose the format by it. What a kill leaves is written over.
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
+    # Writers choose the format by the suffix, in lower case. What a kill leaves is written over.
+    temporary = path.with_name(f".{path.stem}.part{path.suffix.lower()}")
     try:
         yield temporary
         _to_disk(temporary)
@@ -31,6 +33,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if error.errno and error.filename in (None, str(temporary)):
             error.filename = str(path)
         raise
+    except InputError as error:
+        if error.where != printable(temporary):
+            raise
+        raise type(error)(path, error.key, error.value, error.problem) from None
     finally:
         temporary.unlink(missing_ok=True)
 

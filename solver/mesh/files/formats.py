@@ -123,10 +123,4 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
     if suffix not in WRITTEN:
         raise InputError(path, "extension", path.suffix, f"allowed: {', '.join(WRITTEN)}")
     with replacing(path) as temporary:
-        # gmsh goes by the extension, in lower case.
-        whole = temporary.with_name(f"{temporary.name}{suffix}")
-        try:
-            import_module(_READERS[suffix], __package__).write(mesh, whole)
-            whole.replace(temporary)
-        finally:
-            whole.unlink(missing_ok=True)
+        import_module(_READERS[suffix], __package__).write(mesh, temporary)

@@ -7,6 +7,7 @@ groups are one text of 80 characters each, and faces of solids (edges of plane m
 further column behind their nodes.
 """
 
+from io import BytesIO
 from pathlib import Path
 
 import h5py
@@ -152,7 +153,10 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
     )
     written.cell_tags = {int(cell_tag[i]): n for i, n in enumerate(cell_names) if n}
     written.point_tags = {int(node_tag[i]): n for i, n in enumerate(node_names) if n}
-    meshio.write(path, written, file_format="med")
+    # In memory: where a disk is full HDF5 leaves files that cannot be closed.
+    content = BytesIO()
+    meshio.med.write(content, written)
+    path.write_bytes(content.getvalue())
 
 
 def _as_in_med(kind: str, nodes: np.ndarray) -> np.ndarray:

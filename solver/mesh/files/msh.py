@@ -3,6 +3,8 @@
 Groups that share members are written as the sets that a member alone can belong to.
 """
 
+import errno
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -13,6 +15,9 @@ import numpy as np
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...system.errors import InputError
 from ..recipes.gmsh_session import POINT, current_model, foreign_types, node_order, session
+
+
+_END = b"$EndElements\n"
 
 
 def combinations(
@@ -47,7 +52,11 @@ def read(path: Path) -> meshio.Mesh:
 
 
 def write(mesh: meshio.Mesh, path: Path) -> None:
-    """Write the mesh; its groups are physical ones, those of nodes as points."""
+    """Write the mesh; its groups are physical ones, those of nodes as points.
+
+    Raises OSError where it cannot be written. gmsh does not say so of a full disk.
+    """
+    path.touch()
     numbers = np.arange(1, 1 + len(mesh.points))
     places = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
     members: dict[tuple[int, str], list[int]] = {}
@@ -74,3 +83,7 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
         for (dim, name), entities in members.items():
             gmsh.model.addPhysicalGroup(dim, entities, name=name)
         gmsh.write(str(path))
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - len(_END), 0))
+        if file.read() != _END:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
