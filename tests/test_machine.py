@@ -72,12 +72,10 @@ def test_a_full_disk_leaves_no_part_of_a_mesh(case, tmp_path, suffix, capsys):
         assert [left.name for left in file.parent.iterdir()] == ["fill"]
 
 
-def test_what_cannot_be_kept_is_named(case, tmp_path, capsys):
+def test_pictures_that_cannot_be_kept_are_named(case, tmp_path, capsys):
     out = tmp_path / "out"
     with small_disk(out, 4):
         (out / "fill").write_bytes(bytes(4 << 10))
-        assert main(["export", str(case), "--code", "calculix", "-o", str(out / "deck")]) == 2
-        assert capsys.readouterr().err == f"{out / 'deck'}: No space left on device\n"
         drawn = ["-o", str(tmp_path / "r.vtkhdf"), "--pictures", str(out)]
         assert main(["solve", str(case), *drawn]) == 0
         assert re.search(f"^no pictures: {out}/.*No space left", capsys.readouterr().out, re.M)
@@ -104,6 +102,18 @@ def test_a_folder_or_mesh_without_permission_is_2_with_one_line(case, tmp_path):
     assert [file.name for file in out.iterdir()] == ["v.json"]
     mesh.chmod(0o644)
     assert main(solve(case, out, "--mesh", mesh)) == 0
+
+
+@pytest.mark.parametrize("command", ["solve", "list"])
+def test_without_a_reader_nothing_is_said_to_have_ended_well(case, tmp_path, command):
+    arguments = solve(case, tmp_path) if command == "solve" else ["list"]
+    program = [sys.executable, "-m", "solver", *arguments]
+    ours, theirs = os.pipe()
+    os.close(ours)
+    with os.fdopen(theirs, "w") as nobody:
+        ended = subprocess.run(program, cwd=ROOT, stdout=nobody, stderr=subprocess.PIPE, text=True)
+    assert (ended.returncode, ended.stderr) == (-signal.SIGPIPE, "")
+    assert [file.name for file in tmp_path.iterdir()] == [case.name]
 
 
 def test_a_mesh_that_vanished_is_2_and_back_again_is_solved(case, tmp_path, capsys):

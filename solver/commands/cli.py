@@ -116,11 +116,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return NO_RESULT
         except KeyboardInterrupt:
             return INTERRUPTED
-        except BrokenPipeError:  # the reader of our output has gone, as `head` does
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return PASSED
         except Exception as error:  # noqa: BLE001 -- status 1, Python's own, means a failed check
-            return _unexpected(error, getattr(options, "output", None) or "output")
+            return _unexpected(error)
 
 
 @contextmanager
@@ -132,6 +129,8 @@ def _own_process() -> Iterator[None]:
     # An unsound result is refused in one line: earlier warnings of libraries add nothing.
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
+    # Where the reader of its output has gone, as `head` does, a process ends as others do.
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     # Ctrl-C ends a command, not Python while it imports the program or exits: there it would print
     # a traceback.
     if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
@@ -143,9 +142,9 @@ def _own_process() -> Iterator[None]:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _unexpected(error: Exception, output: object) -> int:
+def _unexpected(error: Exception) -> int:
     """One line for what the machine lacks, a traceback for a bug."""
-    if reason := of_machine(error, output):
+    if reason := of_machine(error):
         print(reason, file=sys.stderr)
         return REFUSED if isinstance(error, OSError) else NO_RESULT
     traceback.print_exception(error)

@@ -98,7 +98,7 @@ def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict"
     try:
         draw_all(Row(verdict, folder), pictures, solution)
     except Exception as error:  # noqa: BLE001 -- the solve is what counts
-        reason = of_machine(error, pictures) or f"{type(error).__name__}: {error}"
+        reason = of_machine(error) or f"{type(error).__name__}: {error}"
         _LOG.log(OUTCOME, "no pictures: %s", reason)
 
 

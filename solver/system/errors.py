@@ -28,17 +28,14 @@ class MachineError(InputError):
     """The input is valid, but memory or disk is short. Another run may succeed."""
 
 
-def of_machine(error: Exception, output: object = "output") -> str:
-    """One line for an error of the machine (memory, a file that cannot be used); else empty.
-
-    `output`: what was written, where the error does not name a file.
-    """
+def of_machine(error: Exception) -> str:
+    """One line for an error of the machine (memory, a file that cannot be used); else empty."""
     said = " ".join(str(error).split())
     unmapped = isinstance(error, ImportError) and "failed to map segment" in said
     if isinstance(error, MemoryError) or unmapped:
         return f"out of memory: {said or 'none left'}"
     if isinstance(error, OSError) and error.errno:
-        return f"{error.filename or output}: {error.strerror}"
+        return f"{error.filename or 'output'}: {error.strerror}"
     return ""
 
 
