@@ -265,3 +265,18 @@ def numbers_of(case, folder, threads):
         fields = [file["VTKHDF/PointData"][key][()] for key in ("displacement", "stress")]
         fields += [file["contact/interface"][key][()] for key in ("multiplier", "gap")]
     return [number for field in fields for number in field.ravel().tolist()]
+
+
+def test_a_link_to_itself_is_no_file_and_no_folder(case, tmp_path, capsys):
+    link, new = tmp_path / "loop", str(tmp_path / "new")
+    link.symlink_to(link)
+    (tmp_path / "d.inp").write_text("*INCLUDE, INPUT=loop\n")
+    commands = {
+        "init": ["init", str(link)],
+        "code": ["export", str(case), "--code", str(link), "-o", new],
+        "cases": ["list", "--cases", str(link)],
+        "include": ["inspect", str(tmp_path / "d.inp")],
+    }
+    for name, command in commands.items():
+        assert main(command) == 2, name
+        assert len(capsys.readouterr().err.splitlines()) == 1

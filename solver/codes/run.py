@@ -156,10 +156,10 @@ def plugin(folder: Path) -> PluginCode:
 
     Raises InputError for a folder that holds none, and for a file that does not fit.
     """
-    if not re.fullmatch(CODE, name := folder.resolve().name):
-        raise InputError(folder, "name", name, "must be letters, digits, -, _ and .")
     if not (path := folder / FILE).is_file():
         raise InputError(folder, "code", None, f"a folder with {FILE} is needed")
+    if not re.fullmatch(CODE, name := folder.resolve().name):
+        raise InputError(folder, "name", name, "must be letters, digits, -, _ and .")
     file = read_as(PluginFile, read_mapping(path), path)
     try:
         re.compile(file.gave_up)

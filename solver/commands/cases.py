@@ -104,8 +104,7 @@ def add_init(command: argparse.ArgumentParser) -> None:
 
 
 def run_init(options: argparse.Namespace) -> int:
-
-    folder, name = options.folder, options.folder.resolve().name
+    folder, name = options.folder, options.folder.absolute().name
     if not re.fullmatch(jobs.PLAIN, name):
         raise InputError(folder, "name", name, "must be letters, digits, `_`, `-` and `.`")
     if folder.exists() and any(folder.iterdir()):

@@ -200,10 +200,10 @@ def _included(
 ) -> tuple[Path, Path, tuple[Path, ...]]:
     """The file of an *INCLUDE: its name starts from the folder of the job, or of its own file."""
     file = _named(block.options.get("INPUT", ""), job, block.file)
-    if len(inside) > _DEEPEST or file.resolve() in {other.resolve() for other in inside}:
-        raise block.refusal(f"{file} includes itself, or is more than {_DEEPEST} files deep")
     if not file.is_file():
         raise block.refusal(f"{file}: no such file")
+    if len(inside) > _DEEPEST or file.resolve() in {other.resolve() for other in inside}:
+        raise block.refusal(f"{file} includes itself, or is more than {_DEEPEST} files deep")
     return file, job, (*inside, file)
 
 
