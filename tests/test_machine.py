@@ -78,7 +78,9 @@ def test_pictures_that_cannot_be_kept_are_named(case, tmp_path, capsys):
         (out / "fill").write_bytes(bytes(4 << 10))
         drawn = ["-o", str(tmp_path / "r.vtkhdf"), "--pictures", str(out)]
         assert main(["solve", str(case), *drawn]) == 0
-        assert re.search(f"^no pictures: {out}/.*No space left", capsys.readouterr().out, re.M)
+        assert re.search(
+            f"^no pictures: {out}/.*No space left", capsys.readouterr().out, re.MULTILINE
+        )
     assert main(["solve", str(case), *drawn[2:]]) == 2
     assert capsys.readouterr().err == f"--pictures: folder = '{out}': needs a result: add -o\n"
 
@@ -265,6 +267,13 @@ def numbers_of(case, folder, threads):
         fields = [file["VTKHDF/PointData"][key][()] for key in ("displacement", "stress")]
         fields += [file["contact/interface"][key][()] for key in ("multiplier", "gap")]
     return [number for field in fields for number in field.ravel().tolist()]
+
+
+def test_texts_are_utf_8_whatever_the_terminal_has():
+    settings = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    program = [sys.executable, "-m", "solver", "list"]
+    told = subprocess.run(program, cwd=ROOT, env=settings, capture_output=True, check=True)
+    assert "é" in told.stdout.decode()
 
 
 def test_a_link_to_itself_is_no_file_and_no_folder(case, tmp_path, capsys):

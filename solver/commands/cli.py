@@ -98,6 +98,10 @@ _OF_WORKFLOW = {
 }
 
 
+# What a text cannot hold, such as the bytes of an odd file name, is written escaped.
+_ESCAPED = "backslashreplace"
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by default that of this process; the exit status."""
     with _own_process() if arguments is None else nullcontext():
@@ -123,9 +127,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 @contextmanager
 def _own_process() -> Iterator[None]:
     """What holds for a process that is for one command alone."""
-    # Lines leave as they are written, so that the last line of a log is what was said last.
+    # Lines leave as they are written, so that the last line of a log is what was said last. They
+    # are UTF-8 as all files are, whatever the terminal has; a fork has it so from its parent.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
+        if sys.stdout.errors != _ESCAPED:
+            sys.stdout.reconfigure(encoding="utf-8", errors=_ESCAPED)
     # An unsound result is refused in one line: earlier warnings of libraries add nothing.
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
