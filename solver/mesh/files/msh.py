@@ -16,7 +16,6 @@ from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...system.errors import InputError
 from ..recipes.gmsh_session import POINT, current_model, foreign_types, node_order, session
 
-
 _END = b"$EndElements\n"
 
 
