@@ -227,6 +227,7 @@ def test_figures_are_svg_and_a_notebook_shows_one():
             {"loads": [{"group": "press", "pressure": lambda x: x}]},
             r"case: loads\[0\].pressure = .*: must be a number, text, true or false, a list or a m",
         ),
+        ({"name": "\ud800"}, r"case: text = '\\ud800': must have characters that UTF-8 can write"),
         ({"name": "1e3"}, None),
     ],
 )

@@ -3,6 +3,7 @@
 import json
 import re
 import xml.etree.ElementTree as ET
+from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import unquote
 
 import pytest
@@ -128,6 +129,14 @@ def test_the_script_is_written_where_it_is_missing_or_another(tmp_path, monkeypa
     write_script(tmp_path)
     assert len(written) == 2
     assert (tmp_path / SCRIPT).read_text(encoding="utf-8") == text
+
+
+def test_pages_that_are_written_at_once_share_the_script(tmp_path):
+    with ThreadPoolExecutor(4) as pages:
+        for folder in map(str, range(20)):
+            list(pages.map(write_script, [tmp_path / folder] * 4))
+            text = (tmp_path / folder / SCRIPT).read_text(encoding="utf-8")
+            assert text.endswith(charts._TEMPLATES.joinpath(SCRIPT).read_text(encoding="utf-8"))
 
 
 def test_the_libraries_are_kept_with_the_packages_that_they_come_from(tmp_path, monkeypatch):
