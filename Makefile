@@ -107,22 +107,21 @@ converge: environment ## uncertainty by refined meshes: of cases with known answ
 	@$(OURS) converge $(if $(CASE),"$(CASE)",$(CONVERGE)) \
 	  $(if $(LEVELS),--levels $(LEVELS)) -o results/report
 
-STUDY = @$(SNAKEMAKE) $@
 study stability infsup scaling benchmark: override CONFIG += $(if $(LEVEL),level=$(LEVEL))
 study: environment ## error against run time, all treatments; a part in minutes: LEVEL=quick
-	$(STUDY)
+	@$(SNAKEMAKE) $@
 
 stability: environment ## numerical stability: vary quantities until the answer breaks; some values: LEVEL=quick
-	$(STUDY)
+	@$(SNAKEMAKE) $@
 
 infsup: environment ## the inf-sup test of every cell type, and the half-loaded block
-	$(STUDY)
+	@$(SNAKEMAKE) $@
 
 scaling: environment ## cost up to a million unknowns; a minute: LEVEL=quick; ten million: LEVEL=large
-	$(STUDY)
+	@$(SNAKEMAKE) $@
 
 benchmark: environment ## time ratios: linear solvers, cut, safeguards, CalculiX
-	$(STUDY)
+	@$(SNAKEMAKE) $@
 
 test: test-environment ## run the tests
 	@$(ALONE) pytest -n auto --dist worksteal $(ARGS)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import yaml
 
+from tests.arguments import whole
+
 from .array import PAIRS, covering, smallest, store, stored
 from .judge import Outcome, tried
 from .options import Row
@@ -21,7 +23,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def main() -> int:
     """Solve all rows; the page, and each failure reduced."""
-    strength, started = int(os.environ.get("STRENGTH", "2")), time.monotonic()
+    started = time.monotonic()
+    strength = whole("STRENGTH", os.environ.get("STRENGTH", str(PAIRS)), PAIRS, PAIRS + 1)
     rows = stored() if strength == PAIRS else covering(strength)
     if not rows:
         store(rows := covering(strength))

@@ -6,6 +6,8 @@ from collections import Counter
 
 import yaml
 
+from tests.arguments import whole
+
 from .cases import drawn
 from .judge import compared
 
@@ -27,4 +29,4 @@ def main(count: int, start: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:3])))
+    sys.exit(main(whole("COUNT", sys.argv[1]), whole("SEED", sys.argv[2], 0)))

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import h5py
 
+from tests.arguments import whole
 from tests.workflow.projects import new_project, without_times
 
 PYTHON = [sys.executable, "-m"]
@@ -231,12 +232,13 @@ def kill_at_random(folder, count, seed, targets, log=print):
 def main():
     """Strike as often as the command line says; status 1 where something did not recover."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--count", default="100")
+    parser.add_argument("--seed", default="0")
     options = parser.parse_args()
+    count, seed = whole("--count", options.count), whole("--seed", options.seed, 0)
     with tempfile.TemporaryDirectory() as folder:
         project = Path(folder) / "project"
-        failures, struck = kill_at_random(project, options.count, options.seed, MIXTURE)
+        failures, struck = kill_at_random(project, count, seed, MIXTURE)
     for (name, number), times in sorted(struck.items()):
         print(f"{name}, {number}: {times}")
     print(f"{struck.total() - len(failures)} of {struck.total()} kills recovered.")
