@@ -4,12 +4,13 @@ By its path with the option -P, no module of the current folder is imported: `-m
 first, and a file `re.py` or `enum.py` there would join it.
 """
 
-import signal
+# Built into Python: a file `signal.py` of the current folder is another module.
+import _signal  # type: ignore[import-not-found]
 import sys
 
 # Ctrl-C ends this process at once while Python imports: a traceback of there tells nothing.
-if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+    _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
 if not __package__:
     from importlib.util import module_from_spec, spec_from_file_location
 

@@ -43,7 +43,7 @@ def test_foreign_modules_do_not_join_a_run_and_nothing_is_written_into_the_home_
     home.mkdir()
     for name in ("re", "types", "enum", "solver"):
         (project / f"{name}.py").write_text(TAKEN_OVER)
-    for name in ("yaml", "numpy", "h5py", "jsonschema"):
+    for name in ("yaml", "numpy", "h5py", "jsonschema", "signal"):
         (project / f"{name}.py").write_text(TAKEN_OVER)
         (hostile / f"{name}.py").write_text(TAKEN_OVER)
     (hostile / "sitecustomize.py").write_text(TAKEN_OVER)
