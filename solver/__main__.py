@@ -8,7 +8,7 @@ first, and a file `re.py` or `enum.py` there would join it.
 import _signal  # type: ignore[import-not-found]
 import sys
 
-# Ctrl-C ends this process at once while Python imports: a traceback of there tells nothing.
+# While Python imports the program, Ctrl-C ends the process at once, without a traceback.
 if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
     _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
 if not __package__:

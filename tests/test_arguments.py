@@ -1,4 +1,4 @@
-"""Numbers that targets of make are given."""
+"""Numbers in the settings of make targets."""
 
 import pytest
 

@@ -45,7 +45,7 @@ def parse_mapping(text: str, where: Path) -> dict[str, Any]:
     """The mapping in a YAML text.
 
     Raises `InputError`, under the name `where`, for a text that is not one mapping, or holds an
-    alias, a tag, a duplicate key or a number that is not finite.
+    alias, a tag, a duplicate key, a number that is not finite or half of a surrogate pair.
     """
     try:
         _refuse_markup(text)
@@ -58,6 +58,9 @@ def parse_mapping(text: str, where: Path) -> dict[str, Any]:
             context = getattr(error, "context", None)
             reason = f"must be YAML ({f'{context}, ' if context else ''}{reason})"
         raise InputError(where, line, None, reason) from None
+    except UnicodeEncodeError as error:
+        allowed = "must have characters that UTF-8 can write"
+        raise InputError(where, "text", text[error.start], allowed) from None
     if not isinstance(content, dict):
         raise InputError(where, "file", content, "must be a mapping of keys to values")
     return content

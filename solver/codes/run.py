@@ -32,7 +32,7 @@ from ..case.yaml import read_mapping
 from ..lac.cells.catalogue import cell_type
 from ..lac.errors import SolveError
 from ..system.errors import InputError, hint, of_machine
-from ..system.files import write_text
+from ..system.files import replacing
 from ..system.process import printed_by, run_in_subprocess
 from ..system.progress import now
 from ..verification.stored import write_verdict
@@ -303,7 +303,8 @@ def run_case(
             return verdict
         finally:
             if (said := Path(scratch, LOG)).is_file():
-                write_text(folder / LOG, said.read_text(encoding="utf-8"))
+                with replacing(folder / LOG) as kept:
+                    kept.write_bytes(said.read_bytes())
 
 
 def _thin(found: ForeignResult) -> ForeignResult:

@@ -98,7 +98,7 @@ _OF_WORKFLOW = {
 }
 
 
-# What a text cannot hold, such as the bytes of an odd file name, is written escaped.
+# Characters that UTF-8 cannot encode, such as those of an odd file name, are written escaped.
 _ESCAPED = "backslashreplace"
 
 
@@ -127,8 +127,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 @contextmanager
 def _own_process() -> Iterator[None]:
     """What holds for a process that is for one command alone."""
-    # Lines leave as they are written, so that the last line of a log is what was said last. They
-    # are UTF-8 as all files are, whatever the terminal has; a fork has it so from its parent.
+    # Each line leaves as it is written, so that the last line of a log is what was said last.
+    # Output is UTF-8, as all files are, whatever the terminal uses. A fork inherits this.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
         if sys.stdout.errors != _ESCAPED:
@@ -136,10 +136,10 @@ def _own_process() -> Iterator[None]:
     # An unsound result is refused in one line: earlier warnings of libraries add nothing.
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
-    # Where the reader of its output has gone, as `head` does, a process ends as others do.
+    # When the reader of its output goes away, as `head` does, the process ends like any program.
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    # Ctrl-C ends a command, not Python while it imports the program or exits: there it would print
-    # a traceback.
+    # Only a command handles Ctrl-C. While Python imports the program or exits, an interrupt would
+    # print a traceback.
     if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

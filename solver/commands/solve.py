@@ -91,7 +91,7 @@ def _job(options: argparse.Namespace) -> "Job":
 
 
 def _draw(pictures: Path, folder: Path, solution: "Solution", verdict: "Verdict") -> None:
-    """Draw what the report shows of a solve; what is missing the report draws itself."""
+    """Draw what the report shows of a solve; the report draws whatever is missing."""
     from ..report.pictures import draw_all
     from ..report.rows import Row
 

@@ -198,8 +198,9 @@ def write_script(folder: Path) -> None:
     file = folder / SCRIPT
     there = file.read_text(encoding="utf-8") if file.is_file() else ""
     if not (there.startswith(head) and there.endswith(tail)):
-        with suppress(FileNotFoundError):  # pages written at once have one script
-            write_text(file, head + _libraries() + tail)
+        script = head + _libraries() + tail
+        with suppress(FileNotFoundError):  # a page written at the same time wrote the same script
+            write_text(file, script)
 
 
 def _head() -> str:

@@ -153,7 +153,7 @@ def write(mesh: meshio.Mesh, path: Path) -> None:
     )
     written.cell_tags = {int(cell_tag[i]): n for i, n in enumerate(cell_names) if n}
     written.point_tags = {int(node_tag[i]): n for i, n in enumerate(node_names) if n}
-    # In memory: where a disk is full HDF5 leaves files that cannot be closed.
+    # Made in memory: HDF5 cannot close a file on a full disk.
     content = BytesIO()
     meshio.med.write(content, written)
     path.write_bytes(content.getvalue())

@@ -53,7 +53,7 @@ def read(path: Path) -> meshio.Mesh:
 def write(mesh: meshio.Mesh, path: Path) -> None:
     """Write the mesh; its groups are physical ones, those of nodes as points.
 
-    Raises OSError where it cannot be written. gmsh does not say so of a full disk.
+    Raises OSError where the file cannot be written; gmsh does not report a full disk.
     """
     path.touch()
     numbers = np.arange(1, 1 + len(mesh.points))
