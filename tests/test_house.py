@@ -2,6 +2,7 @@
 
 import ast
 from collections import Counter
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -17,6 +18,22 @@ def test_imports_within_the_package_are_relative():
             if isinstance(node, ast.ImportFrom) and not node.level:
                 named = [node.module]
             assert not [n for n in named if n.partition(".")[0] == "solver"], (file, node.lineno)
+
+
+def imported(file):
+    """The files of the package that a file imports, in functions and for type checkers too."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            names = [place / alias.name for alias in node.names]
+            found = [each.with_suffix(".py") for each in names if each.with_suffix(".py").is_file()]
+            yield from found or [place.with_suffix(".py"), place / "__init__.py"]
+
+
+def test_no_files_import_each_other_in_a_circle():
+    """Neither for their work nor for types alone: what both need has a place of its own."""
+    order = TopologicalSorter({file: [*imported(file)] for file in SOURCES.rglob("*.py")})
+    assert len([*order.static_order()]) > 250
 
 
 def test_no_two_classes_share_a_name():

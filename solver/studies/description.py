@@ -30,8 +30,6 @@ numbers, lists of up to three numbers (then the variables are x, y and z), or na
 mapping `{label: value}` says how each is shown.
 """
 
-from collections.abc import Iterator
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
@@ -50,7 +48,6 @@ from ..case.typed import (
 )
 from ..case.yaml import read_mapping
 from ..system.errors import InputError, hint
-from .points import Point
 
 LEVELS = FULL, QUICK, LARGE = "full", "quick", "large"
 MEASURES = ("solve", "timed", "process", "digits", "inf_sup", "profile", "quantities")
@@ -74,9 +71,9 @@ Name = Annotated[
 ]
 Count = Annotated[int, Meta(ge=0, le=1024, description="a whole number from 0 to 1024")]
 Seconds = Annotated[float, Meta(gt=0, le=1e9, description="a positive number of seconds")]
-_Value = float | str | Annotated[tuple[float, ...], Meta(min_length=1, max_length=3)]
+Value = float | str | Annotated[tuple[float, ...], Meta(min_length=1, max_length=3)]
 Values = Annotated[
-    tuple[_Value, ...] | dict[str, float | tuple[float, ...]],
+    tuple[Value, ...] | dict[str, float | tuple[float, ...]],
     Meta(description="a list of numbers, of lists of up to three or of names, or {label: value}"),
 ]
 Vary = dict[str, Values]
@@ -155,7 +152,7 @@ class StudyGroup(Section, frozen=True):
     vary: Vary = field(default_factory=dict)
     quick: Vary | None = None
     large: Vary | None = None
-    beyond: tuple[_Value, ...] = ()
+    beyond: tuple[Value, ...] = ()
     state: Literal["compression", "hydrostatic"] = "compression"
     measure: Literal["", *MEASURES] = ""  # type: ignore[valid-type]
     figure: Literal["", *FIGURES] = ""  # type: ignore[valid-type]
@@ -242,24 +239,6 @@ class Study(Section, frozen=True, dict=True):
             raise InputError(where, key, name, f"no such group; {hint(name, known)}")
         return known[name]
 
-    def points(self, group: StudyGroup) -> list[Point]:
-        """The points of a group, series by series."""
-        return [point for series in group.series for point in self._of_series(group, series)]
-
-    def _of_series(self, group: StudyGroup, series: Series) -> Iterator[Point]:
-        vary = {axis: _labelled(values) for axis, values in (group.vary | series.vary).items()}
-        for swapped in series_directions(series):
-            for values in product(*(vary[axis].items() for axis in vary)):
-                labels = dict(zip(vary, (label for label, _ in values), strict=True))
-                chosen = {
-                    a: self.axes[a][k] for a, k in labels.items() if k in self.axes.get(a, {})
-                }
-                if all(choice.is_for(group, series) for choice in chosen.values()):
-                    numbers = {
-                        a: v for a, (_, v) in zip(vary, values, strict=True) if a not in chosen
-                    }
-                    yield Point(self, group, series, swapped, labels, numbers, chosen)
-
 
 def read_study(path: Path, level: str = FULL) -> Study:
     """The study in a file, or its quick or large part; InputError says what is refused."""
@@ -294,25 +273,3 @@ def _part(group: StudyGroup, part: Vary) -> StudyGroup:
         if one.name in names
     )
     return structs.replace(group, vary=group.vary | vary, series=series)
-
-
-def series_directions(series: Series) -> tuple[bool, ...]:
-    """The directions in which a series is solved: whether slave and master are exchanged."""
-    which = series.directions or str(read_mapping(series.case).get("directions", "first"))
-    return {"first": (False,), "swapped": (True,), "both": (False, True)}.get(which, (False,))
-
-
-def _labelled(values: Values) -> dict[str, Any]:
-    """The values of an axis by what they are called."""
-    return dict(values) if isinstance(values, dict) else {_shown(value): value for value in values}
-
-
-def _shown(value: _Value) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, tuple):
-        return " × ".join(f"{v:g}" for v in value)
-    if value != 0 and not 1e-3 <= abs(value) < 1e4:
-        mantissa, exponent = f"{value:.9e}".split("e")
-        return f"{float(mantissa):g}e{int(exponent)}"
-    return f"{value:.10g}"

@@ -33,7 +33,7 @@ from ..lac.cells.shape import shape_functions
 from ..lac.errors import SolveError
 from ..mechanics.fem.block import Block, CellSum
 from ..mechanics.fem.elasticity import physical_gradients, stiffness
-from ..mechanics.linear.choice import factorise
+from ..mechanics.linear.factor import factorise
 from ..simulation.equilibrium.problem import ContactProblem
 from ..simulation.options import Options, Safeguards, Shortcuts
 from ..simulation.results.solution import Solution

@@ -14,6 +14,7 @@ from ..report.formats import menu, render
 from ..report.tables import as_csv
 from ..system.files import write_text
 from .description import FULL, Study, StudyGroup
+from .points import points_of
 
 Record = Mapping[str, Any]
 SOLVED, REFUSED, MISSING = "solved", "refused", "missing"
@@ -108,7 +109,7 @@ def read_group(study: Study, group: StudyGroup, folder: Path) -> MeasuredGroup:
     """A group with the records in `folder`."""
     from .run import identity
 
-    expected = [identity(point) for point in study.points(group)]
+    expected = [identity(point) for point in points_of(study, group)]
     try:
         content = json.loads((folder / f"{group.name}.json").read_text(encoding="utf-8"))
         known = {point["name"]: point for point in content["points"] if point["outcome"]}

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from itertools import product
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -16,9 +17,7 @@ from ..case.expressions import Expression
 from ..case.model import Case
 from ..case.reader import parse_case
 from ..case.yaml import read_mapping
-
-if TYPE_CHECKING:
-    from .description import Choice, Run, Series, Study, StudyGroup
+from .description import Choice, Run, Series, Study, StudyGroup, Value, Values
 
 
 @dataclass(frozen=True)
@@ -102,3 +101,41 @@ def merged(base: Any, change: Any) -> Any:
     if not (isinstance(base, Mapping) and isinstance(change, Mapping)):
         return change
     return {**base, **{key: merged(base.get(key), item) for key, item in change.items()}}
+
+
+def points_of(study: Study, group: StudyGroup) -> list[Point]:
+    """The points of a group, series by series."""
+    return [point for series in group.series for point in _of_series(study, group, series)]
+
+
+def _of_series(study: Study, group: StudyGroup, series: Series) -> Iterator[Point]:
+    vary = {axis: _labelled(values) for axis, values in (group.vary | series.vary).items()}
+    for swapped in _directions(series):
+        for values in product(*(vary[axis].items() for axis in vary)):
+            labels = dict(zip(vary, (label for label, _ in values), strict=True))
+            chosen = {a: study.axes[a][k] for a, k in labels.items() if k in study.axes.get(a, {})}
+            if all(choice.is_for(group, series) for choice in chosen.values()):
+                numbers = {a: v for a, (_, v) in zip(vary, values, strict=True) if a not in chosen}
+                yield Point(study, group, series, swapped, labels, numbers, chosen)
+
+
+def _directions(series: Series) -> tuple[bool, ...]:
+    """The directions in which a series is solved: whether slave and master are exchanged."""
+    which = series.directions or str(read_mapping(series.case).get("directions", "first"))
+    return {"first": (False,), "swapped": (True,), "both": (False, True)}.get(which, (False,))
+
+
+def _labelled(values: Values) -> dict[str, Any]:
+    """The values of an axis by what they are called."""
+    return dict(values) if isinstance(values, dict) else {_shown(value): value for value in values}
+
+
+def _shown(value: Value) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple):
+        return " × ".join(f"{v:g}" for v in value)
+    if value != 0 and not 1e-3 <= abs(value) < 1e4:
+        mantissa, exponent = f"{value:.9e}".split("e")
+        return f"{float(mantissa):g}e{int(exponent)}"
+    return f"{value:.10g}"

@@ -19,7 +19,7 @@ from ..system.process import cores_for
 from ..system.progress import OUTCOME, now
 from . import measures
 from .description import FULL, Study, StudyGroup, read_study
-from .points import Point
+from .points import Point, points_of
 from .timing import measure_apart, surroundings
 
 _LOG = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ def run_group(
     from ..verification.provenance import gather
 
     started, points = now(), []
-    for point in study.points(group):
+    for point in points_of(study, group):
         record = identity(point) | _measure(study, group, point, file, level)
         points.append(record)
         _LOG.log(OUTCOME, "%s/%s: %s", group.name, point.name, _short(record))
@@ -83,7 +83,7 @@ def measure_here(job: Mapping[str, Any]) -> None:
     """Measure a timed point in this process, and write its record."""
     study = read_study(Path(job["study"]), job["level"])
     group = study.group(job["group"])
-    point = next(point for point in study.points(group) if point.name == job["point"])
+    point = next(point for point in points_of(study, group) if point.name == job["point"])
     repetitions = study.repetitions if group.repetitions is None else group.repetitions
     record = measures.attempt(lambda: measures.timed(point, repetitions, job["started"]))
     write_text(job["output"], json.dumps(record))

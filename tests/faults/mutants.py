@@ -206,7 +206,7 @@ MUTANTS = (
     Mutant("stale-system", "the factored system belongs to the first status", CLOSING,
            "mechanics.linear.systems:Systems.closed", first_system_kept),
     Mutant("wrong-factor", "the factorisation belongs to half the stiffness", PLANE,
-           "mechanics.linear.condensation:prepare", factor_of_half),
+           "mechanics.linear.choice:Solvers.prepare", factor_of_half),
     Mutant("multiplier-sign", "the multiplier has the wrong sign in the equilibrium", PLANE,
            "mechanics.linear.condensation:CondensedSystem.multiplier",
            changed(lambda p: -p)),

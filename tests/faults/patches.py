@@ -112,7 +112,7 @@ def first_system_kept(true: Wrapped) -> Wrapped:
 
 def factor_of_half(true: Wrapped) -> Wrapped:
     """As of another stiffness, and no refinement that would make up for it."""
-    return lambda matrix, *rest: true(matrix.tocsr() * 0.5, *rest)
+    return lambda self, matrix: true(self, matrix.tocsr() * 0.5)
 
 
 def never_closes(true: Wrapped) -> Wrapped:

@@ -13,7 +13,7 @@ from solver.lac.facets import project_along
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import element_matrices
 from solver.mechanics.fem.loads import body_forces
-from solver.mechanics.linear.choice import factorise
+from solver.mechanics.linear.factor import factorise
 from solver.mesh import read_mesh
 from solver.system.errors import InputError
 from solver.verification.checks import accepted_values, regression_file

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from solver.studies.description import read_study
-from solver.studies.points import merged
+from solver.studies.points import merged, points_of
 from solver.system.errors import InputError
 from tests.studies.measured import CASES, OURS, STABILITY, WORK, point
 
@@ -44,7 +44,7 @@ def file(tmp_path):
 
 def test_points_are_the_product_less_what_a_choice_is_not_for(file):
     study = read_study(file)
-    names = [p.name for p in study.points(study.group("one"))]
+    names = [p.name for p in points_of(study, study.group("one"))]
     assert names == [
         *("TRIA3, constants/1", "TRIA3, constants/2", "TRIA3, smooth/1", "TRIA3, smooth/2"),
         *("QUAD4, constants/4", "QUAD4, swapped, constants/4"),
@@ -53,18 +53,18 @@ def test_points_are_the_product_less_what_a_choice_is_not_for(file):
 
 def test_a_point_is_a_case_with_what_is_set_for_it(file):
     study = read_study(file)
-    first, *_, last = study.points(study.group("one"))
+    first, *_, last = points_of(study, study.group("one"))
     content = json.loads(last.source)
     assert content["mesh"]["refine"] == 4
     assert content["contact"][0]["recovery"] == "none"
     assert (first.case.mesh.source["refine"], last.case.zones[0].recovery) == (1, "none")
-    pair, _ = study.points(study.group("two"))
+    pair, _ = points_of(study, study.group("two"))
     assert json.loads(pair.source)["mesh"]["top"]["divisions"] == [3, 2]
 
 
 def test_a_part_has_some_series_and_values(file):
     quick = read_study(file, "quick")
-    assert [p.name for g in quick.groups for p in quick.points(g)] == ["TRIA3/1"]
+    assert [p.name for g in quick.groups for p in points_of(quick, g)] == ["TRIA3/1"]
     with pytest.raises(InputError, match="no group has a part `large`"):
         read_study(file, "large")
     file.write_text(TEXT.replace("series: [TRIA3]", "series: [TRIA4]"))
@@ -104,14 +104,14 @@ def test_an_expression_that_is_none_names_its_key(file):
     file.write_text(TEXT.replace('"=x+y"', '"=x+w"'))
     study = read_study(file)
     with pytest.raises(InputError, match=r"set.mesh.top.divisions\[0\]"):
-        _ = study.points(study.group("two"))[0].source
+        _ = points_of(study, study.group("two"))[0].source
 
 
 @pytest.mark.parametrize("path", OURS, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_ours_make_valid_cases_with_names_of_their_own(path):
     study = read_study(path)
     for group in study.groups:
-        points = study.points(group)
+        points = points_of(study, group)
         assert len({p.name for p in points}) == len(points)
         for one in [*points[:2], *points[-2:]]:
             odd = one.choices.get("treatment")
@@ -121,11 +121,11 @@ def test_ours_make_valid_cases_with_names_of_their_own(path):
 def test_values_that_are_shown_by_a_label():
     assert point(STABILITY, "poisson").case.materials["bottom"].poisson == -0.9
     study = read_study(STABILITY)
-    labels = {p.labels["x"] for p in study.points(study.group("poisson"))}
+    labels = {p.labels["x"] for p in points_of(study, study.group("poisson"))}
     assert {"½-1e-4", "½-1e-15"} <= labels
 
 
 def test_our_study_of_work_has_every_treatment():
     study = read_study(WORK)
-    names = {p.labels.get("treatment") for g in study.groups for p in study.points(g)} - {None}
+    names = {p.labels.get("treatment") for g in study.groups for p in points_of(study, g)} - {None}
     assert names == set(study.axes["treatment"])

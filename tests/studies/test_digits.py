@@ -7,6 +7,7 @@ from solver.simulation.options import Safeguards
 from solver.studies import digits
 from solver.studies.description import read_study
 from solver.studies.figures import digits as figure
+from solver.studies.points import points_of
 from tests.studies.measured import STABILITY, group, point, study
 
 
@@ -62,7 +63,7 @@ def test_a_point_holds_by_its_floor_or_beyond_by_its_own_estimate():
 @pytest.mark.parametrize("name", ["zone", "slivers", "warp"])
 def test_quick_points_hold(name):
     quick = read_study(STABILITY, "quick")
-    assert all(digits.measure(p)["holds"] for p in quick.points(quick.group(name)))
+    assert all(digits.measure(p)["holds"] for p in points_of(quick, quick.group(name)))
 
 
 def test_the_map_without_safeguards_is_of_a_plain_implementation():

@@ -10,6 +10,7 @@ from solver.studies.description import read_study
 from solver.studies.figures import growth, inf_sup, orders, profiles, ratios, work_precision
 from solver.studies.measures import attempt, profile
 from solver.studies.page import read_group, write_page
+from solver.studies.points import points_of
 from solver.studies.run import run_group, write_group
 from solver.studies.theory import THEORY, element_size
 from tests.studies.measured import INFSUP, group, study
@@ -285,7 +286,7 @@ def test_the_cut_alone_has_to_level_off():
 
 def block(cells, cut, contact):
     of = read_study(INFSUP, "quick")
-    points = of.points(of.group("half-loaded"))
+    points = points_of(of, of.group("half-loaded"))
     return next(p for p in points if p.line.startswith(f"{cells}, {cut}, {contact}"))
 
 
@@ -343,7 +344,7 @@ def test_a_timed_point_is_measured_in_a_process_of_its_own(tmp_path):
     file = CASES / "studies" / "study.yaml"
     quick = read_study(file, "quick")
     patch = next(g for g in quick.groups if g.name == "patch-2d")
-    name = quick.points(patch)[0].name
+    name = points_of(quick, patch)[0].name
     from solver.studies.timing import measure_apart
 
     job = {"study": str(file), "level": "quick", "group": "patch-2d", "point": name}

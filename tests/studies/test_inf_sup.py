@@ -8,6 +8,7 @@ from solver.simulation.scene.scene import build_scene
 from solver.studies.description import read_study
 from solver.studies.figures.inf_sup import levels_off
 from solver.studies.measures import inf_sup, inf_sup_constant
+from solver.studies.points import points_of
 from tests.scenes import block_mesh, changed_case
 from tests.studies.measured import INFSUP
 
@@ -98,7 +99,7 @@ def test_the_other_stable_treatments_level_off_too(treatment, coarser):
 def test_simplices_prisms_and_pyramids_level_off_with_the_cut_alone(cells, contact, levels):
     study = read_study(INFSUP)
     name = f"{cells} on {contact}" if contact else cells
-    points = study.points(study.group("space-clamped-2"))
+    points = points_of(study, study.group("space-clamped-2"))
 
     def records(cut):
         point = next(p for p in points if (p.series.name, p.labels["cut"]) == (name, cut))

@@ -16,11 +16,10 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.errors import SolveError
-from .choice import LinearSolver, Shared, prepare
+from .choice import LinearSolver, Solvers
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .krylov import EPSILON, ROUGH
 from .symmetric_blocks import Stiffness
-from .unknowns import Unknowns
 
 _LOG = logging.getLogger(__name__)
 
@@ -173,16 +172,14 @@ def condense(
     matrix: Stiffness,
     constraints: sparse.csr_matrix,
     own: np.ndarray,
-    unknowns: Unknowns | None = None,
-    gave_up: str = "",
-    shared: Shared | None = None,
+    solvers: Solvers | None = None,
     springs: np.ndarray = _NO_SPRINGS,
 ) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
-    `own` (n,) marks the unknowns that may be eliminated, `unknowns` describes all, `gave_up` says
-    why multigrid is not tried again, `shared`; none is needed (see `prepare`). With `springs` (s,),
-    their stiffnesses, K has s unknowns more; the constraints (m, n + s) may hold these.
+    `own` (n,) marks the unknowns that may be eliminated; `solvers` of K, or factors without any.
+    With `springs` (s,), their stiffnesses, K has s unknowns more; the constraints (m, n + s) may
+    hold these.
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
     """
@@ -200,7 +197,7 @@ def condense(
     parts = kept_columns, pivot, follow, springs
     condensed = _condensed(matrix, *parts) if len(pivot) else matrix
     return CondensedSystem(
-        factor=prepare(condensed, unknowns, gave_up, shared),
+        factor=(solvers or Solvers()).prepare(condensed),
         kept=kept_columns,
         follow=follow.tocsr(),
         pivot=pivot,

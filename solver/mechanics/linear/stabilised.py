@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from .choice import Factor, Shared, factorise
+from .choice import Solvers
 from .condensation import CondensedSystem, ConstrainedSystem, condense
+from .factor import Factor, factorise
 from .krylov import EPSILON
 from .symmetric_blocks import Stiffness
-from .unknowns import Unknowns
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,7 @@ def stabilise(
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     compliance: Compliance,
-    unknowns: Unknowns | None = None,
-    gave_up: str = "",
-    shared: Shared | None = None,
+    solvers: Solvers | None = None,
 ) -> StabilisedSystem:
     """Condense K (n, n) and its springs by G (m, n) and the `compliance`; see `condense`.
 
@@ -94,5 +92,5 @@ def stabilise(
     """
     whole = sparse.hstack([constraints, compliance.scatter.T], format="csr")
     springs = 1 / compliance.weight
-    condensed = condense(matrix, whole, own, unknowns, gave_up, shared, springs)
+    condensed = condense(matrix, whole, own, solvers, springs)
     return StabilisedSystem(factor=condensed.factor, condensed=condensed, compliance=compliance)

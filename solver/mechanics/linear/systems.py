@@ -21,9 +21,10 @@ from scipy import sparse
 
 from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
-from .choice import Factor, Shared, factorise, prepare
+from .choice import Solvers
 from .condensation import ConstrainedSystem, condense
 from .condensed_matrix import CondensedMatrix, Symmetric
+from .factor import Factor, factorise
 from .krylov import EPSILON
 from .stabilised import Compliance, stabilise
 from .symmetric_blocks import Stiffness
@@ -102,14 +103,12 @@ class AugmentedSystem(ConstrainedSystem):
 def augment(
     matrix: Stiffness,
     constraints: sparse.csr_matrix,
-    unknowns: Unknowns | None = None,
-    gave_up: str = "",
-    shared: Shared | None = None,
+    solvers: Solvers | None = None,
 ) -> AugmentedSystem:
     """Prepare K x = f + Gᵀ p, G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
-    `unknowns`, `gave_up`, `shared`: see `prepare`. Raises SolveError where constraints nearly
-    depend on one another, or a factor finds that they leave a motion free.
+    `solvers` of K, or a factor without any. Raises SolveError where constraints nearly depend on
+    one another, or a factor finds that they leave a motion free.
     """
     compliance = _compliance(matrix)
     square = constraints.multiply(constraints) @ compliance
@@ -120,7 +119,7 @@ def augment(
         scaled = (sparse.diags(1 / size) @ constraints).tocsr()
         gram = factorise(scaled @ sparse.diags(compliance) @ scaled.T, least=_LEAST)
         weight = max(_WEIGHT, _REDUCTION / gram.smallest)
-        factor = prepare(_augmented(matrix, scaled, weight), unknowns, gave_up, shared)
+        factor = (solvers or Solvers()).prepare(_augmented(matrix, scaled, weight))
         if factor.warning:
             raise SolveError(factor.warning)
     except SolveError as error:
@@ -238,23 +237,24 @@ class Systems:
         compliance: Callable[[np.ndarray], Compliance] | None = None,
     ):
         self._matrix, self._constraints, self._own = matrix, constraints, own
-        self._unknowns, self._parts, self._compliance = unknowns, parts, compliance
+        self._parts, self._compliance = parts, compliance
         self._kept: dict[int, tuple[bytes, ConstrainedSystem]] = {}
-        self._gave_up: dict[int, str] = {}
-        self._shared = [Shared() for _ in parts]
+        alone = len(parts) == 1
+        mine = (unknowns if alone else unknowns.of(np.flatnonzero(p.unknowns)) for p in parts)
+        self._solvers = [Solvers(each) for each in mine]
         self.latest: ConstrainedSystem | None = None
 
     def forget(self) -> None:
         """Keep no factor."""
         for number in list(self._kept):
             self._drop(number)
-            self._shared[number].close()
+            self._solvers[number].forget()
 
     def _drop(self, number: int) -> None:
         """Drop a part's system, and remember why multigrid failed on it, if it did."""
         self.latest, factor = None, self._kept.pop(number)[1].factor
         if factor.gave_up:
-            self._gave_up[number] = factor.gave_up
+            self._solvers[number].gave_up = factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
@@ -264,29 +264,28 @@ class Systems:
                 self._drop(number)  # releases its memory first
             if number in self._kept:
                 continue
-            matrix, constraints, own, unknowns = self._of(part, mine)
-            known = unknowns, self._gave_up.get(number, ""), self._shared[number]
+            (matrix, constraints, own), solvers = self._of(part, mine), self._solvers[number]
             system: ConstrainedSystem
             if own is None:
-                system = augment(matrix, constraints, *known)
+                system = augment(matrix, constraints, solvers)
             elif self._compliance and len((soft := self._compliance(mine)).weight):
-                system = stabilise(matrix, constraints, own, soft, *known)
+                system = stabilise(matrix, constraints, own, soft, solvers)
             else:
-                system = condense(matrix, constraints, own, *known)
+                system = condense(matrix, constraints, own, solvers)
             self._kept[number] = mine.tobytes(), system
         self.latest = self._kept[0][1] if len(self._parts) == 1 else self._together(closed)
         return self.latest
 
     def _of(
         self, part: Part, closed: np.ndarray
-    ) -> tuple[Stiffness, sparse.csr_matrix, np.ndarray | None, Unknowns]:
-        """Matrix, `closed` constraints, own and all unknowns of a part."""
+    ) -> tuple[Stiffness, sparse.csr_matrix, np.ndarray | None]:
+        """Matrix, `closed` constraints and own unknowns of a part."""
         own, constraints = self._own, self._constraints[closed]
         if len(self._parts) == 1:
-            return self._matrix, constraints, own, self._unknowns
+            return self._matrix, constraints, own
         chosen = np.flatnonzero(part.unknowns)
-        matrix, unknowns = self._matrix.tocsr()[chosen][:, chosen], self._unknowns.of(chosen)
-        return matrix, constraints[:, chosen], None if own is None else own[chosen], unknowns
+        matrix = self._matrix.tocsr()[chosen][:, chosen]
+        return matrix, constraints[:, chosen], None if own is None else own[chosen]
 
     def _together(self, closed: np.ndarray) -> "IndependentSystems":
         """The systems of all parts as one."""
@@ -313,9 +312,12 @@ class Systems:
             for number, (_, system) in list(self._kept.items()):
                 if system.factor.iterative:
                     self._drop(number)
-            before, self._gave_up = self._gave_up, dict.fromkeys(range(len(self._parts)), _MANY)
+            before = [solvers.gave_up for solvers in self._solvers]
+            for solvers in self._solvers:
+                solvers.gave_up = _MANY
             try:
                 return self.closed(closed)
             finally:
-                self._gave_up = before
+                for solvers, reason in zip(self._solvers, before, strict=True):
+                    solvers.gave_up = reason
         return self.closed(closed)

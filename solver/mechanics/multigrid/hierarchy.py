@@ -20,8 +20,8 @@ import numpy as np
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, identity
 
 from ...lac.errors import SolveError
-from ..linear.choice import factorise_roughly
 from ..linear.condensed_matrix import CondensedMatrix, Symmetric, in_blocks
+from ..linear.factor import factorise_roughly
 from ..linear.krylov import eigenvalue_bound
 from ..linear.products import InParts, chosen_rows, multiply, pattern, scale_blocks, sums_of_sizes
 from ..linear.symmetric_blocks import NodalMatrix, SymmetricBlocks, halved

@@ -21,7 +21,6 @@ from scipy.sparse import csr_matrix
 
 from ...lac.errors import SolveError
 from ...lac.threads import prefetch
-from ..linear.choice import Shared
 from ..linear.condensed_matrix import CondensedMatrix, Symmetric
 from ..linear.krylov import EPSILON, conjugate_gradients, in_single, two_steps
 from ..linear.products import multiply, multiply_transposed
@@ -115,6 +114,28 @@ _PATIENCE, _SLOW = 30, 60
 _LEAST_SINGLE, _SINGLE = 1e-5, 1e-3
 # A share of the unknowns: where more are beside contact, a factor of these is one of everything.
 _MOST_BESIDE = 1 / 4
+
+
+class Shared:
+    """The hierarchy of one stiffness matrix, set up once for all contact statuses.
+
+    `slow`: whether iterations were so slow that coarse levels take two steps each from then on.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is set up yet."""
+        self._hierarchy: Hierarchy | None = None
+        self.slow = False
+
+    def hierarchy(self, matrix: Symmetric, unknowns: Unknowns) -> Hierarchy:
+        """The hierarchy of `matrix`, the same at each call until it is closed."""
+        if self._hierarchy is None:
+            self._hierarchy = Hierarchy(matrix, unknowns)
+        return self._hierarchy
+
+    def close(self) -> None:
+        """Release its memory."""
+        self._hierarchy = None
 
 
 class Multigrid:

@@ -9,7 +9,7 @@ from ...lac.cells.faces import surface_nodes, surface_points
 from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.faces import face_integrals
 from ...mechanics.fem.supports import DEPENDENT
-from ...mechanics.linear.choice import factorise
+from ...mechanics.linear.factor import factorise
 from ...mechanics.mortar.edge import Edges, contact_edges
 from ..equilibrium.recovery import RecoveredZone
 from ..equilibrium.state import Equilibrium, force_at_rest

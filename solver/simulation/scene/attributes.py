@@ -29,27 +29,16 @@ from ...system.errors import InputError
 from .cut_groups import CutGroups
 from .groups import ALL
 from .holdings import holdings_of
+from .holdings.frame import Frame
 from .holdings.holding import Holding
 
 if TYPE_CHECKING:
     from ...mechanics.mortar.quadric import Quadric
-    from .holdings.rigid import Frame
     from .parts.springs import Springs
 
 
 class Attributes(CutGroups):
     """What the case gives the groups: materials, supports and loads."""
-
-    @cached_property
-    def exact_part(self) -> np.ndarray:
-        """The part (n,) of the case's exact solution that each node belongs to."""
-        return self._exact.node_parts(self.points + self.origin, self.body)
-
-    @property
-    def _exact(self) -> ExactSolution:
-        if self.case.reference.exact is None:
-            raise AssertionError("a value is taken from a solution that the case does not name")
-        return self.case.reference.exact
 
     def by_part(self, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
         """Cells or faces (n, n_nodes) by the part of the exact solution in which they lie."""
@@ -164,11 +153,6 @@ class Attributes(CutGroups):
                 raise InputError(self.case.path, key, None, str(error)) from None
         return free
 
-    def exact_displacement(self, nodes: np.ndarray) -> np.ndarray:
-        """The displacement (k, dim) of the case's exact solution at nodes (k,)."""
-        place = self.points[nodes] + self.origin
-        return self._exact.displacement(place, self.exact_part[nodes])
-
     def forces(self, name: str | None = None) -> np.ndarray:
         """Nodal forces (n, dim) of all loads, or those of a `name`, at load factor 1.
 
@@ -248,7 +232,7 @@ class Attributes(CutGroups):
 
     def _exact_force(self, kind: str, name: str, nodes: np.ndarray, part: int) -> np.ndarray:
         """Forces (n, dim) of the exact solution's body force or stress on cells or faces."""
-        exact, origin, at = self._exact, self.origin, (self.points, nodes, name)
+        exact, origin, at = self.exact, self.origin, (self.points, nodes, name)
         if kind == "body_force":
             return body_forces(*at, lambda x: exact.body_force(x + origin, part), self.axisymmetric)
         pressure = kind == "pressure"

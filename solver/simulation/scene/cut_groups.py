@@ -17,6 +17,7 @@ from ...case.acting import Scalar
 from ...case.expressions import evaluate
 from ...case.file import Zone
 from ...case.model import Case
+from ...case.solutions.base import ExactSolution
 from ...lac.cells.catalogue import BY_MESHIO, BY_NAME
 from ...lac.cells.faces import FaceBlock
 from ...lac.cut import CutMesh, SubFaces
@@ -155,6 +156,23 @@ class CutGroups:
     def body(self) -> np.ndarray:
         """The body (n,) of each node."""
         return body_numbers(len(self.points), self.cut.cells)
+
+    @cached_property
+    def exact_part(self) -> np.ndarray:
+        """The part (n,) of the case's exact solution that each node belongs to."""
+        return self.exact.node_parts(self.points + self.origin, self.body)
+
+    @property
+    def exact(self) -> ExactSolution:
+        """The exact solution that the case names."""
+        if self.case.reference.exact is None:
+            raise AssertionError("a value is taken from a solution that the case does not name")
+        return self.case.reference.exact
+
+    def exact_displacement(self, nodes: np.ndarray) -> np.ndarray:
+        """The displacement (k, dim) of the case's exact solution at nodes (k,)."""
+        place = self.points[nodes] + self.origin
+        return self.exact.displacement(place, self.exact_part[nodes])
 
 
 def _part(block: FaceBlock, sub: SubFaces, number: np.ndarray) -> FaceBlock:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanics.fem.supports import Fixed
-from .holdings.rigid import Frame
+from .holdings.frame import Frame
 
 
 @dataclass(frozen=True, kw_only=True)

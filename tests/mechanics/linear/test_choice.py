@@ -11,9 +11,10 @@ from scipy.sparse import block_array, csc_matrix, csr_matrix, diags, eye, kron, 
 from scipy.sparse.linalg import spsolve
 
 from solver.lac.errors import SolveError
-from solver.mechanics.linear.choice import factorise, factorise_roughly
+from solver.mechanics.linear.choice import Solvers
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
+from solver.mechanics.linear.factor import factorise, factorise_roughly
 from solver.mechanics.linear.unknowns import Unknowns
 
 
@@ -35,7 +36,7 @@ def test_condensed_correction_meets_the_constraint_in_equilibrium():
     """Compared with the system of displacement and multiplier, solved as it is."""
     matrix, constraints = chain_over_floor(30)
     force, violation = np.random.default_rng(0).standard_normal(31), np.array([0.2])
-    system = condense(matrix, constraints, np.arange(31) == 0, stands_for(matrix))
+    system = condense(matrix, constraints, np.arange(31) == 0, Solvers(stands_for(matrix)))
     saddle = sparse.bmat([[matrix, -constraints.T], [constraints, None]]).toarray()
     expected = np.linalg.solve(saddle, np.concatenate([force, violation]))
     found = system.correction(force, violation)
@@ -57,7 +58,7 @@ def between_two_chains(count):
 def test_condensed_matrix_is_that_of_the_expansion():
     matrix, constraints = between_two_chains(12)
     own = np.arange(24) < 12
-    system = condense(matrix, constraints, own, stands_for(matrix, dim=2))
+    system = condense(matrix, constraints, own, Solvers(stands_for(matrix, dim=2)))
     expected = (system.expansion.T @ matrix @ system.expansion).toarray()
     np.testing.assert_allclose((constraints @ system.expansion).toarray(), 0, atol=1e-15)
     kept = np.setdiff1d(np.arange(24), system.pivot)

@@ -5,6 +5,7 @@ import pytest
 from scipy import sparse
 
 from solver.lac.errors import SolveError
+from solver.mechanics.linear.choice import Solvers
 from solver.mechanics.linear.stabilised import Compliance, StabilisedSystem, stabilise
 from solver.mechanics.linear.systems import Part, Systems, augment
 from solver.mechanics.multigrid import multigrid
@@ -103,7 +104,7 @@ def test_multigrid_of_overlapping_constraints(slave, master, monkeypatch):
     matrix, constraints, unknowns = sharing(slave, master)
     force, violation, exact, multiplier = loaded(matrix, constraints)
     with force_solver("multigrid"):
-        system = augment(matrix, constraints, unknowns)
+        system = augment(matrix, constraints, Solvers(unknowns))
     found = system.correction(force, violation)
     assert "multigrid" in system.factor.name
     assert system.factor.iterations <= 50
@@ -118,7 +119,7 @@ def test_each_correction_gains_the_digits_asked_for():
     matrix, constraints, unknowns = sharing(8, 6)
     force, violation, exact, _ = loaded(matrix, constraints)
     with force_solver("multigrid"):
-        system = augment(matrix, constraints, unknowns)
+        system = augment(matrix, constraints, Solvers(unknowns))
     found, errors = np.zeros(len(force)), [1.0]
     for _ in range(3):
         left = force - matrix @ found, violation - constraints @ found
@@ -211,7 +212,7 @@ def system_of(slave: int, master: int, stiffness: float, kind: str) -> tuple:
     matrix, gaps, own, unknowns = pressed(slave, master)
     compliance = neighbours(slave, stiffness)
     with force_solver(kind):
-        system = stabilise(matrix, gaps, own, compliance, unknowns)
+        system = stabilise(matrix, gaps, own, compliance, Solvers(unknowns))
     return system, matrix, gaps, compliance
 
 

@@ -5,6 +5,7 @@ import pytest
 from scipy.sparse import block_diag, bsr_matrix, csr_matrix, eye, random_array
 from scipy.sparse.linalg import spsolve
 
+from solver.mechanics.linear.choice import Solvers
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.condensed_matrix import CondensedMatrix
 from solver.mechanics.linear.symmetric_blocks import halved
@@ -49,7 +50,7 @@ def pressed(slave: int, master: int):
 
 def condensed(matrix, gaps, own, unknowns) -> CondensedMatrix:
     with force_solver("multigrid"):
-        return condense(matrix, gaps, own, unknowns).factor._matrix
+        return condense(matrix, gaps, own, Solvers(unknowns)).factor._matrix
 
 
 def test_corrected_matrix_is_the_condensed_one():
@@ -197,7 +198,7 @@ def test_no_contact_needs_no_correction():
     matrix, gaps, own, unknowns = pressed(4, 3)
     grounded = csr_matrix(matrix + eye(matrix.shape[0]))
     with force_solver("multigrid"):
-        system = condense(grounded, gaps[:0], own, unknowns)
+        system = condense(grounded, gaps[:0], own, Solvers(unknowns))
         right = np.ones(matrix.shape[0])
         change = system.correction(right, np.zeros(0))
     np.testing.assert_allclose(grounded @ change, right, atol=1e-10)

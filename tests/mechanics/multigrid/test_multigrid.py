@@ -13,14 +13,14 @@ from solver.lac.errors import SolveError
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.elasticity import lame_parameters, stiffness
 from solver.mechanics.linear import choice, condensed_matrix, products
-from solver.mechanics.linear.choice import Shared
+from solver.mechanics.linear.choice import Solvers
 from solver.mechanics.linear.condensation import condense
 from solver.mechanics.linear.krylov import ROUGH, two_steps
 from solver.mechanics.linear.symmetric_blocks import NodalMatrix
 from solver.mechanics.linear.systems import Part, Systems
 from solver.mechanics.linear.unknowns import Unknowns
 from solver.mechanics.multigrid import hierarchy
-from solver.mechanics.multigrid.multigrid import Multigrid
+from solver.mechanics.multigrid.multigrid import Multigrid, Shared
 from tests.patches import force_solver
 from tests.scenes import grid
 
@@ -157,14 +157,14 @@ def test_right_hand_side_that_is_no_number():
 def test_choice_by_size_and_dimension(monkeypatch):
     matrix, unknowns = clamped(6)
     monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0])
-    large = choice.prepare(matrix, unknowns)
+    large = Solvers(unknowns).prepare(matrix)
     assert "multigrid" in large.name
     assert "unknowns or more in 3D" in large.why
-    plane = choice.prepare(matrix, replace(unknowns, dim=2))
+    plane = Solvers(replace(unknowns, dim=2)).prepare(matrix)
     assert "multigrid" not in plane.name
     assert "2D" in plane.why
     monkeypatch.setattr(choice, "MULTIGRID_FROM", matrix.shape[0] + 1)
-    small = choice.prepare(matrix, unknowns)
+    small = Solvers(unknowns).prepare(matrix)
     assert "multigrid" not in small.name
     assert "fewer than" in small.why
 
@@ -189,7 +189,7 @@ def test_coarse_levels_that_would_fill_in_are_not_formed(monkeypatch):
     with pytest.raises(SolveError, match=r"its coarse levels would fill in, to \d+ neighbours"):
         Multigrid(matrix, unknowns)
     with force_solver("multigrid"):
-        chosen = choice.prepare(matrix, unknowns)
+        chosen = Solvers(unknowns).prepare(matrix)
     assert "multigrid" not in chosen.name
     assert chosen.gave_up == chosen.why
 
@@ -241,7 +241,7 @@ def test_the_product_of_a_level_is_what_it_leaves_of_a_residual():
     n = matrix.shape[0]
     rows = csr_matrix(([1.0, -1.0], ([0, 0], [0, 90])), shape=(1, n))
     with force_solver("multigrid"):
-        solver = condense(matrix, rows, np.arange(n) == 0, unknowns).factor
+        solver = condense(matrix, rows, np.arange(n) == 0, Solvers(unknowns)).factor
     for level in solver._solver._levels:
         assert level.correction is not None
         x, b = np.random.default_rng(7).standard_normal((2, level.matrix.shape[0])).astype("f4")
@@ -270,7 +270,7 @@ def test_nodal_blocks_give_the_solution_of_the_entries(tied):
     right, violation = np.random.default_rng(4).standard_normal(n), np.ones(int(tied))
     own = np.arange(n) == 5
     with force_solver("multigrid"):
-        systems = [condense(each, rows, own, unknowns) for each in (matrix, nodal)]
+        systems = [condense(each, rows, own, Solvers(unknowns)) for each in (matrix, nodal)]
     found = [system.correction(right, violation) for system in systems]
     assert "multigrid" in systems[1].factor.name
     np.testing.assert_allclose(found[1], found[0], rtol=0, atol=1e-12 * np.abs(found[0]).max())
@@ -280,7 +280,7 @@ def test_nodal_blocks_give_the_solution_of_the_entries(tied):
 def test_choice_as_asked_for():
     matrix, unknowns = clamped(6)
     for kind, name in (("multigrid", "multigrid"), ("cholmod", "CHOLMOD")):
-        chosen = choice.prepare(matrix, replace(unknowns, solver=kind))
+        chosen = Solvers(replace(unknowns, solver=kind)).prepare(matrix)
         assert name in chosen.name
         assert chosen.why == "as asked for"
 
@@ -292,12 +292,14 @@ def test_a_factor_takes_over_where_multigrid_does_not_converge(options):
         Multigrid(matrix, unknowns).solve(np.ones(matrix.shape[0]))
     exact = np.ones(matrix.shape[0])
     with force_solver("multigrid"):
-        chosen = choice.prepare(matrix, unknowns)
+        chosen = Solvers(unknowns).prepare(matrix)
         assert "multigrid" in chosen.name
         np.testing.assert_allclose(chosen.solve(matrix @ exact), exact, rtol=1e-6)
         assert "multigrid" not in chosen.name
         assert "conjugate gradients leave a residual" in chosen.why
-        again = choice.prepare(matrix, unknowns, chosen.gave_up)
+        solvers = Solvers(unknowns)
+        solvers.gave_up = chosen.gave_up
+        again = solvers.prepare(matrix)
         assert (again.name, again.why) == (chosen.name, chosen.why)
 
 
@@ -322,7 +324,7 @@ def test_free_body_is_in_doubt():
     everything = np.ones_like(points, dtype=bool)
     matrix, unknowns = held(points, matrix, everything, np.zeros(len(points), dtype=int))
     with force_solver("multigrid"):
-        found = choice.prepare(matrix, unknowns)
+        found = Solvers(unknowns).prepare(matrix)
         found.solve(np.ones(matrix.shape[0]))
     assert "singular" in found.warning or "not positive definite" in found.warning
 
@@ -337,7 +339,7 @@ def test_memory_beside_the_stiffness_is_less_than_one_and_a_half_of_its_own(monk
     right = np.ones(matrix.shape[0])
     with force_solver("multigrid"):
         tracemalloc.start()
-        system = condense(matrix, rows, own, unknowns)
+        system = condense(matrix, rows, own, Solvers(unknowns))
         system.correction(right, np.zeros(1))
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

@@ -11,16 +11,12 @@ only where the case has its key. A new one is a new file here and a line in `hol
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from ..cut_groups import CutGroups
 from .holding import Holding
 from .imposed import Imposed, RingAxis
 
-if TYPE_CHECKING:
-    from ..attributes import Attributes
 
-
-def holdings_of(groups: Attributes) -> list[Holding]:
+def holdings_of(groups: CutGroups) -> list[Holding]:
     """The chain of a case."""
     case = groups.case
     found: list[Holding] = [RingAxis(groups)] if groups.axisymmetric else []

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ....mechanics.fem.supports import Fixed, FreeMotion
-
-if TYPE_CHECKING:
-    from .rigid import Frame
+from .frame import Frame
 
 
 class Holding:

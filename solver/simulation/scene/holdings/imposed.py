@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ....case.expressions import Exact
 from ....lac.cells.faces import nodal_normals
 from ....mechanics.fem.supports import Fixed
+from ..cut_groups import CutGroups
 from .holding import Holding
-
-if TYPE_CHECKING:
-    from ..attributes import Attributes
 
 
 class RingAxis(Holding):
     """The circles of points on the axis have no radius, and keep it."""
 
-    def __init__(self, groups: Attributes):
+    def __init__(self, groups: CutGroups):
         self._points = groups.points
 
     def fixed(
@@ -37,7 +34,7 @@ class RingAxis(Holding):
 class Imposed(Holding):
     """The displacements that supports impose."""
 
-    def __init__(self, groups: Attributes):
+    def __init__(self, groups: CutGroups):
         self._groups = groups
 
     def fixed(
