@@ -220,8 +220,9 @@ def project_along(
     if lost.any():
         face, q = np.nonzero(lost)
         direction = np.broadcast_to(direction, target.shape)
-        rest = corner[face], target[face, q][:, None], direction[face, q][:, None]
-        again, height, size = _from_the_middle(kind, *rest)
+        again, height, size = _from_the_middle(
+            kind, corner[face], target[face, q][:, None], direction[face, q][:, None]
+        )
         place[lost], distance[lost] = again[:, 0], height[:, 0]
         lost[lost] = ~(size[:, 0] <= _ACCEPTED)
     if lost.any():
@@ -244,8 +245,9 @@ def _newton(
         rows = np.flatnonzero(~(size <= _CONVERGED).all(axis=1))
         if not len(rows):
             break
-        given = (values[rows] for values in (corner, target, direction, place, distance))
-        step = _newton_step(kind, *given)
+        step = _newton_step(
+            kind, corner[rows], target[rows], direction[rows], place[rows], distance[rows]
+        )
         place[rows] -= step[..., :-1]
         distance[rows] -= step[..., -1]
         size[rows] = np.abs(step[..., :-1]).max(axis=-1, initial=0.0)

@@ -266,5 +266,5 @@ def _solve_complementarity(
 
 
 def _log(iteration: int, closed: np.ndarray, wrong: np.ndarray) -> None:
-    known = iteration, int(closed.sum()), len(closed), int(wrong.sum())
-    _LOG.info("contact status: iteration %d, %d of %d closed, %d wrong", *known)
+    text = "contact status: iteration %d, %d of %d closed, %d wrong"
+    _LOG.info(text, iteration, int(closed.sum()), len(closed), int(wrong.sum()))

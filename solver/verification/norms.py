@@ -47,7 +47,7 @@ from ..lac.cells.shape import gauss_rule, shape_functions
 from ..lac.threads import prefetch
 from ..mechanics.fem.elasticity import shapes_in
 from ..mechanics.fem.faces import pieces
-from ..simulation.results.exact import ExactValues, computed_pressure, computed_traction
+from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 
 # Numbers of gradients handled at once.
@@ -178,7 +178,7 @@ def _traction_errors(solution: Solution, exact: ExactSolution) -> dict[str, floa
         at = surface_points(solution.mesh.points, zone.faces, solution.case.axisymmetric)
         traction = values.friction_traction(zone, at.place)
         weight = at.weight * zone.coverage[at.macro]
-        error = computed_traction(zone, at) - traction
+        error = zone.friction.values(at, zone.recovered) - traction
         squares += _integral(weight, error), _integral(weight, traction)
     return {"traction_l2": _root(*squares), "traction_means": _root(*means)}
 

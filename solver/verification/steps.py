@@ -1,8 +1,8 @@
 """Load steps, probes and contact zones in a result file: see `solver.verification.results`."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
-from typing import Any, TypeVar
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import h5py
 import numpy as np
@@ -10,13 +10,7 @@ import numpy as np
 from ..mechanics.mortar.edge import Edges
 from ..mesh.files.vtkhdf import column, read_table, write_table
 from ..simulation.results.forces import ProbeResult, Reaction, Resultants, RigidMotion
-from ..simulation.results.solution import (
-    NodalContact,
-    RecoveredPressure,
-    StepResult,
-    ZoneFriction,
-    ZoneResult,
-)
+from ..simulation.results.solution import StepResult, ZoneResult
 
 _OF_STEP = (
     *("factor", "iterations", "status_changes", "residual", "complementarity"),
@@ -118,11 +112,12 @@ def read_probes(file: h5py.File) -> dict[str, ProbeResult]:
 T = TypeVar("T")
 # Data sets that are not named as their field.
 _NAMES = {"closed": "status"}
-_PARTS = {
-    "nodal": NodalContact,
-    "recovered": RecoveredPressure,
-    "resultants": Resultants,
-    "friction": ZoneFriction,
+# Records that a zone has or lacks: a group each.
+_PARTS: dict[str, Any] = {
+    name: kind
+    for name, hint in get_type_hints(ZoneResult).items()
+    for kind in get_args(hint)
+    if is_dataclass(kind)
 }
 
 
@@ -137,8 +132,8 @@ def write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     for name in _PARTS:
         if part := getattr(zone, name):
             _write(group.create_group(name), part)
-    if zone.recovered:
-        group["recovered"].attrs["form"] = zone.recovered.form
+            words = {key: value for key, value in vars(part).items() if isinstance(value, str)}
+            group[name].attrs.update(words)
     if zone.resultants and zone.resultants.edges:
         _write(group.create_group("edges"), zone.resultants.edges)
 

@@ -13,6 +13,7 @@ from solver.mechanics.mortar.coulomb import CoulombContact
 from solver.simulation.equilibrium import problem
 from solver.simulation.judgement import validity
 from solver.simulation.results import results
+from solver.simulation.results.friction import zone_friction
 from solver.simulation.scene import operators
 from solver.simulation.scene.parts import strain
 from solver.simulation.scene.parts.springs import Springs
@@ -113,7 +114,7 @@ def _normalised_one_by_one(_: Any) -> Any:
 def _slips_of_all(true: Any) -> Any:
     def result(scene: Any, zone: Any, state: Any, *more: Any) -> Any:
         found = true(scene, zone, state, *more)
-        friction = state.friction and results.zone_friction(zone, state, None)
+        friction = state.friction and zone_friction(zone, state, None)
         return replace(found, friction=friction)
 
     return result

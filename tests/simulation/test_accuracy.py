@@ -18,6 +18,7 @@ from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
 from solver.studies.digits import exact_state
+from solver.studies.points import points_of
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from solver.verification.run import mesh_of
@@ -89,7 +90,7 @@ def test_warped_faces(height):
 def test_plain_rounding(sweep):
     study = read_study(STABILITY)
     group = study.group(sweep)
-    for found in study.points(group)[:4]:
+    for found in points_of(study, group)[:4]:
         share = error_over_estimate(sweep, "2D", found.numbers["x"], state=group.state)
         assert 1 / USELESS < share < 1
 

@@ -17,6 +17,7 @@ from solver.mesh import generate
 from solver.simulation.results.solution import ZoneResult
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
+from solver.studies.points import points_of
 from solver.verification.norms import errors, oscillation
 from solver.verification.run import mesh_of
 from tests.handmade import plane
@@ -251,7 +252,7 @@ def solution(request):
     treatment, _, cut = request.param.partition(":")
     of = next(
         p
-        for p in STUDY.points(STUDY.group("patch-3d"))
+        for p in points_of(STUDY, STUDY.group("patch-3d"))
         if p.labels == {"treatment": treatment, "level": "2"}
     )
     case = of.case.as_solved(False, cut or None)

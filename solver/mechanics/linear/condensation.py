@@ -194,8 +194,9 @@ def condense(
     kept_columns = np.flatnonzero(kept)
     inverse = inverse_of(constraints[:, pivot])
     follow = -(inverse @ constraints[:, kept_columns])
-    parts = kept_columns, pivot, follow, springs
-    condensed = _condensed(matrix, *parts) if len(pivot) else matrix
+    condensed: Symmetric = matrix
+    if len(pivot):
+        condensed = _condensed(matrix, kept_columns, pivot, follow, springs)
     return CondensedSystem(
         factor=(solvers or Solvers()).prepare(condensed),
         kept=kept_columns,

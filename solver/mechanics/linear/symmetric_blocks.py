@@ -133,13 +133,13 @@ def halved(matrix: bsr_matrix) -> SymmetricBlocks:
     edge = matrix.blocksize[0]
     slabs = ranges(matrix.indptr, edge**2, _SLABS)
     counts = np.zeros((2, len(matrix.indptr)), dtype=matrix.indptr.dtype)
-    given = matrix.indptr, matrix.indices
-    _on_slabs(_count, slabs, *given, counts)
+    starts, columns = matrix.indptr, matrix.indices
+    _on_slabs(_count, slabs, starts, columns, counts)
     parts = []
-    for starts in np.cumsum(counts, axis=1, dtype=counts.dtype):
-        data = np.empty((starts[-1], edge, edge), dtype=matrix.dtype)
-        parts.append((data, np.empty(starts[-1], dtype=matrix.indices.dtype), starts))
-    _on_slabs(_part, slabs, *given, matrix.data, *parts[0], *parts[1])
+    for own in np.cumsum(counts, axis=1, dtype=counts.dtype):
+        data = np.empty((own[-1], edge, edge), dtype=matrix.dtype)
+        parts.append((data, np.empty(own[-1], dtype=columns.dtype), own))
+    _on_slabs(_part, slabs, starts, columns, matrix.data, *parts[0], *parts[1])
     whole, upper = (bsr_matrix(part, shape=matrix.shape) for part in parts)
     return SymmetricBlocks(whole, upper, tuple(slabs))
 

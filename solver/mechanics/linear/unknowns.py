@@ -56,13 +56,12 @@ class Unknowns:
         def motions() -> np.ndarray:
             return self.motions()[chosen]
 
-        arrays = self.node[chosen], motions, self.body[chosen], self.points
+        found = replace(self, node=self.node[chosen], motions=motions, body=self.body[chosen])
         if self.linear is None or self.vertices is None:
-            return Unknowns(self.dim, *arrays, factored=self.factored, solver=self.solver)
+            return replace(found, vertices=None, linear=None)
         mine = np.flatnonzero(np.isin(self.vertices, chosen))
         vertices = np.searchsorted(chosen, self.vertices[mine])
-        about = vertices, self.linear[chosen][:, mine], self.factored, self.solver
-        return Unknowns(self.dim, *arrays, *about)
+        return replace(found, vertices=vertices, linear=self.linear[chosen][:, mine])
 
     def of_vertices(self) -> "Unknowns":
         """Those of linear cells on the same vertices."""

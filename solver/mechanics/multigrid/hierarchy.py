@@ -320,8 +320,9 @@ class Hierarchy:
             if near is None:
                 way = smoothed(blocks, tentative, _SMOOTHED / float(bound))
             else:
-                about = nodes.motions, _SMOOTHED, float(bound)
-                way = smoothed_along(blocks, tentative, near, *about)
+                way = smoothed_along(
+                    blocks, tentative, near, nodes.motions, _SMOOTHED, float(bound)
+                )
             _refuse_fill(way)
             blocks, nodes = self._add(blocks, bound, way, coarse_nodes)
         if blocks.shape[0] > LARGEST_DENSE:

@@ -173,12 +173,12 @@ class Multigrid:
         Coarse levels hold springs. These, and constraints that were added with a weight, need the
         exact solve beside contact.
         """
-        about = condensed, hierarchy.scale, hierarchy.place
-        correction, beside = correction_of(*about), None
+        scale, place = hierarchy.scale, hierarchy.place
+        correction, beside = correction_of(condensed, scale, place), None
         needed = condensed.springs or not len(condensed.eliminated)
         self._levels, most = [], np.inf if needed else _MOST_BESIDE * hierarchy.size
         if condensed.springs:
-            beside = correction_of(*about, condensed.springs)
+            beside = correction_of(condensed, scale, place, condensed.springs)
         if not hierarchy.levels:
             return beside or correction
         finest, *coarser = hierarchy.levels
@@ -219,8 +219,10 @@ class Multigrid:
                 _LOG.info("slow iterations: coarse levels take two steps each")
                 self._shared.slow = True
 
-        about = self._precondition, system.lifted(right), accuracy, MAX_ITERATIONS, watch
-        solution, iterations = conjugate_gradients(system.multiply, *about)
+        lifted, most = system.lifted(right), MAX_ITERATIONS
+        solution, iterations = conjugate_gradients(
+            system.multiply, self._precondition, lifted, accuracy, most, watch
+        )
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
         self.iterations = max(self.iterations, iterations)

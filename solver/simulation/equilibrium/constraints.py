@@ -5,7 +5,7 @@ status starts from a guess by loads and initial gaps.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -173,8 +173,9 @@ def _smooth_gaps(scene: Scene) -> sparse.csr_matrix | None:
         if zone.zone.normal != "element" or operator.nodes is not None or scene.space < 3:
             continue
         faces = [(b.number, b.nodes) for b in zone.slave_faces]
-        about = faces, surface_nodes(zone.sub_faces), surface.normal, surface.area, zone.near
-        rows[-1] = smoothed(operator.matrix, Smooth(scene.points, *about))
+        nodes, near = surface_nodes(zone.sub_faces), zone.near
+        smooth = Smooth(scene.points, faces, nodes, surface.normal, surface.area, near)
+        rows[-1] = smoothed(operator.matrix, smooth)
         bent = bent or rows[-1] is not operator.matrix
     slips = [row for zone in scene.zones for row in zone.operator.slip]
     return sparse.vstack([*rows, *slips]).tocsr() if bent else None
@@ -367,10 +368,16 @@ def free_unknowns(scene: Scene) -> Unknowns:
             found[:, number] = scene.free.gathered(field.ravel())
         return found
 
-    factored = next((part.factored for part in scene.parts if part.factored), "")
-    about = dim, node, motions, scene.body[node], scene.points
+    found = Unknowns(
+        dim=dim,
+        node=node,
+        motions=motions,
+        body=scene.body[node],
+        points=scene.points,
+        factored=next((part.factored for part in scene.parts if part.factored), ""),
+        solver=scene.options.solver,
+    )
     if dim == 2 or all(block.type.order == 1 for block in scene.blocks):
-        return Unknowns(*about, factored=factored, solver=scene.options.solver)
-    vertices = from_vertices(scene.points, scene.blocks)
-    linear = linear_unknowns(basis, dim, *vertices)
-    return Unknowns(*about, *linear, factored, scene.options.solver)
+        return found
+    vertices, linear = linear_unknowns(basis, dim, *from_vertices(scene.points, scene.blocks))
+    return replace(found, vertices=vertices, linear=linear)

@@ -150,8 +150,7 @@ class ContactProblem:
         elif start is None:
             start, guess = guess(), None
         elif before is not None:
-            about = scene, self.constraints, self.free_motion
-            start = moved(start, before, step, *about)
+            start = moved(start, before, step, scene, self.constraints, self.free_motion)
         latest: list[Equilibrium] = []
         rough, known = scene.options.shortcuts.status, None
 
@@ -318,15 +317,15 @@ class ContactProblem:
                 continue
             pressure = np.zeros(len(start.closed))
             pressure[start.closed] = multiplier
-            about = iterate, rounding(iterate), pressure, self.diagonal
-            accuracy = estimate(*about, self._rough, residual, scale)
+            rounded, diagonal = rounding(iterate), self.diagonal
+            accuracy = estimate(iterate, rounded, pressure, diagonal, self._rough, residual, scale)
             extends = refine and safeguards.extended and not start.extended
             if extends and accuracy.of_sums > _EXTEND:
                 start = replace(iterate, extended=True)
                 continue
             return Equilibrium(
                 iterate=iterate,
-                trial=judged(*about),
+                trial=judged(iterate, rounded, pressure, diagonal),
                 status=StatusResult(start.closed, 1, []),
                 residual=residual,
                 force_scale=scale,

@@ -1,7 +1,5 @@
 """Balance of forces and moments, reactions, and the resultants of contact in a zone."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import sparse
 
@@ -263,43 +261,22 @@ def resultants(
 ) -> Resultants:
     """Area and edges of the `closed` macro-elements (m,), and the forces on the slave."""
     mean = zone.by_macro_element(state.pressure)
-    edges, area = _extent(scene, zone, mean, closed)
+    edges, area = extent(scene, zone, mean, closed)
     forces = zone.forces(state.pressure)
     if field is not None:
         forces = forces + field.force
     nodes = surface_nodes(zone.sub_faces)
     force = forces.reshape(scene.points.shape)[nodes]
-    found = Resultants(
+    return Resultants(
         area=area,
         force=force.sum(axis=0),
         moment=moment(scene, nodes, force),
         edges=edges,
         pressure=np.array([mean.min(), mean.max()]),
     )
-    if not zone.slips or state.friction is None:
-        return found
-    friction, stick = _friction_resultants(scene, zone, state, mean, nodes)
-    return replace(found, friction=friction, stick=stick)
 
 
-def _friction_resultants(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, mean: np.ndarray, nodes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The force (dim,) of friction on the slave, and the area (3,) that sticks.
-
-    What the traction leaves of the bound, μp − |q|, ends where slip begins, as a pressure ends
-    where contact does: the edge of the sticking area is found in the same way.
-    """
-    assert state.friction is not None
-    forces = zone.tangential_forces(state.pressure).reshape(scene.points.shape)
-    traction = np.linalg.norm([state.pressure[rows] for rows in zone.slips], axis=0)
-    sticks = state.status.closed[zone.numbers] & ~state.friction.slipping[zone.numbers]
-    rest = np.where(sticks, zone.zone.friction * mean - traction, 0.0)
-    _, area = _extent(scene, zone, rest, sticks)
-    return forces[nodes].sum(axis=0), area
-
-
-def _extent(
+def extent(
     scene: Scene, zone: ZoneScene, mean: np.ndarray, closed: np.ndarray
 ) -> tuple[Edges | None, np.ndarray]:
     """The edges of contact in 2D, and the area of contact with its bounds (3,)."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...case.solutions.base import ExactSolution
 from ...lac.cells.catalogue import cell_type
-from ...lac.cells.faces import FACE_POINTS, SurfacePoints, nodal_normals
+from ...lac.cells.faces import FACE_POINTS, nodal_normals
 from ...lac.cells.shape import gauss_rule, shape_functions
 from ...mechanics.fem.faces import means_on_faces
 from ...mechanics.fem.stress import normal_stress
@@ -24,16 +24,6 @@ def computed_pressure(points: np.ndarray, zone: ZoneResult) -> np.ndarray:
             for name, nodes, owner in zone.faces
         ]
     )
-
-
-def computed_traction(zone: ZoneResult, at: SurfacePoints) -> np.ndarray:
-    """The computed traction of friction (k, dim) at points of a zone's surface."""
-    assert zone.friction is not None
-    mean = zone.friction.friction_traction
-    if zone.friction.recovered is None or zone.recovered is None:
-        return mean[at.macro]
-    psi = zone.recovered.shapes(at.macro, at.place[:, None])[:, 0]
-    return mean[at.macro] + np.einsum("qk,qkd->qd", psi, zone.friction.recovered[at.macro])
 
 
 def pressure_on(

@@ -7,15 +7,7 @@ import meshio
 import numpy as np
 
 from ...lac.cells.catalogue import cell_type
-from .solution import Solution, ZoneResult
-
-_ON_FACES = {
-    "pressure": "multiplier",
-    "gap": "gap",
-    "status": "shown_status",
-    "coverage": "coverage",
-    "pressure_error_estimate": "pressure_error_estimate",
-}
+from .solution import Solution
 
 
 def grid_of(solution: Solution) -> meshio.Mesh:
@@ -34,7 +26,7 @@ def grid_of(solution: Solution) -> meshio.Mesh:
 
 def grid_fields(solution: Solution) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """The fields at points (n, …) and of cells (n_cells, …); those of contact on faces alone."""
-    mesh, dim = solution.mesh, solution.mesh.points.shape[1]
+    mesh = solution.mesh
     cell_data = _on_faces(solution)
     n_volumes = sum(len(mesh.cells[i].data) for i in _volumes(solution))
     for name, values in cell_data.items():
@@ -42,14 +34,14 @@ def grid_fields(solution: Solution) -> tuple[dict[str, np.ndarray], dict[str, np
         none_there = np.full((n_volumes, *values.shape[1:]), nothing)
         cell_data[name] = np.concatenate([none_there, values])
     point_data = {
-        "displacement": np.pad(solution.displacement, ((0, 0), (0, 3 - dim))),
+        "displacement": _in_space(solution.displacement),
         "stress": solution.stress,
         "normal_stress": solution.fields.normal_stress,
         "body": solution.fields.body,
     }
     for name in ("reaction", "motion"):
         if (vectors := getattr(solution.fields, name)) is not None:
-            point_data[name] = np.pad(vectors, ((0, 0), (0, 3 - dim)))
+            point_data[name] = _in_space(vectors)
     if any(zone.recovered for zone in solution.zones):
         point_data["recovered_pressure"] = _recovered_at_nodes(solution)
     return point_data, cell_data
@@ -86,18 +78,17 @@ def _on_faces(solution: Solution) -> dict[str, np.ndarray]:
         "macro_element": np.concatenate([none, *(owner for _, _, owner, _ in parts)]),
         "zone": np.concatenate([none, *(np.full(len(o), number) for _, _, o, number in parts)]),
     }
-    for name, attribute in _ON_FACES.items():
-        values = [getattr(solution.zones[n], attribute)[owner] for _, _, owner, n in parts]
-        data[name] = np.concatenate([np.empty(0), *values]).astype(float)
-    if solution.case.frictional:
-        for name in ("friction_traction", "slip", "slip_total"):
-            values = [_of_friction(solution.zones[n], name)[owner] for _, _, owner, n in parts]
-            data[name] = np.concatenate(values)
+    fields = [zone.on_faces() for zone in solution.zones]
+    known = {name: values for of_zone in fields for name, values in of_zone.items()}
+    for name, some in known.items():
+        for zone, of_zone in zip(solution.zones, fields, strict=True):
+            # What another zone has, and this one lacks, is zero here.
+            of_zone.setdefault(name, np.zeros((len(zone.area), *some.shape[1:])))
+        found = np.concatenate([fields[n][name][owner] for _, _, owner, n in parts]).astype(float)
+        data[name] = _in_space(found) if found.ndim > 1 else found
     return data
 
 
-def _of_friction(zone: ZoneResult, name: str) -> np.ndarray:
-    """A vector (m, 3) of friction; zero in a zone without."""
-    m, dim = zone.centre.shape
-    values = np.zeros((m, dim)) if zone.friction is None else getattr(zone.friction, name)
-    return np.pad(values, ((0, 0), (0, 3 - dim)))
+def _in_space(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (n, dim) as (n, 3)."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))

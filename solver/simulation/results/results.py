@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import meshio
 import numpy as np
 
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import surface_nodes, surface_normals
-from ...lac.facets import tangents_of
 from ...mechanics.fem.stress import nodal_stress, normal_stress
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.recovery import Recovered, RecoveredZone
@@ -27,16 +25,16 @@ from .balance import (
     strain_energy,
 )
 from .exact import pressure_on
-from .forces import ProbeResult
+from .forces import ProbeResult, Resultants
+from .friction import with_friction, zone_friction
 from .records import Cost, Fields, Places, Quality, Scalars
+from .recovered import recovered_pressure
 from .solution import (
     BodyInfo,
     Line,
     NodalContact,
-    RecoveredPressure,
     Solution,
     StepResult,
-    ZoneFriction,
     ZoneResult,
 )
 
@@ -166,7 +164,7 @@ def _zone_result(
         pressure_of_forces=pressure_of_forces,
         meshed_gap=_meshed_gap(scene, zone),
         pressure_error=None if field is None else field.error,
-        recovered=_recovered_pressure(scene, zone, state, field),
+        recovered=recovered_pressure(scene, zone, state, field),
         resultants=step.resultants[zone.zone.name],
         friction=zone_friction(zone, state, field) if zone.slips and state.friction else None,
     )
@@ -178,33 +176,6 @@ def _meshed_gap(scene: Scene, zone: ZoneScene) -> np.ndarray:
     apart, none = operator.matrix @ scene.points.ravel(), np.zeros(len(operator.covered))
     apart = np.divide(apart, operator.covered, out=none, where=operator.covered > 0)
     return np.asarray(operator.mean @ apart)
-
-
-def _recovered_pressure(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
-) -> RecoveredPressure | None:
-    """The recovered pressure of a zone, and its mean at each node over the faces around."""
-    if field is None or field.name == "none":
-        return None
-    local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
-    nodes = surface_nodes(zone.sub_faces)
-    found = RecoveredPressure(
-        form=field.name,
-        coefficients=field.coefficients.reshape(len(pressure), -1),
-        degree=field.degree,
-        centre=local.centre + scene.coordinates.origin,
-        axes=local.axes,
-        spread=local.spread,
-        nodes=nodes,
-        at_nodes=np.zeros(len(nodes)),
-    )
-    total, count = np.zeros((2, len(nodes)))
-    for faces in zone.sub_faces:
-        places = scene.points[faces.nodes] + scene.coordinates.origin
-        at = np.searchsorted(nodes, faces.nodes)
-        np.add.at(total, at, found.values(pressure, faces.macro, places))
-        np.add.at(count, at, 1.0)
-    return replace(found, at_nodes=total / count)
 
 
 def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
@@ -249,10 +220,7 @@ def step_results(
                 complementarity=product / (scale * scene.coordinates.length),
                 observations=seen,
                 resultants={
-                    (name := zone.zone.name): resultants(
-                        scene, zone, state, closed_of(zone, state), field.get(name)
-                    )
-                    for zone in scene.zones
+                    zone.zone.name: _resultants(scene, zone, state, field) for zone in scene.zones
                 },
                 reactions=held,
                 rigid=rigid_bodies(scene, state) if scene.held.rigid else [],
@@ -260,6 +228,13 @@ def step_results(
             )
         )
     return results, at_nodes
+
+
+def _resultants(scene: Scene, zone: ZoneScene, state: Equilibrium, field: Recovered) -> Resultants:
+    closed = closed_of(zone, state)
+    found = resultants(scene, zone, state, closed, field.get(zone.zone.name))
+    slides = zone.slips and state.friction
+    return with_friction(found, scene, zone, state) if slides else found
 
 
 def closed_of(zone: ZoneScene, state: Equilibrium) -> np.ndarray:
@@ -280,27 +255,6 @@ def stress_scale(scene: Scene, states: list[Equilibrium], stress: np.ndarray) ->
     ]
     largest = [np.abs(field).max(initial=0.0) for field in (stress, *(s.pressure for s in states))]
     return max(values, default=0.0) or float(max(largest)) or 1.0
-
-
-def zone_friction(zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None) -> ZoneFriction:
-    """Traction, slip and status of a zone."""
-    assert state.friction is not None
-    tangents = tangents_of(zone.operator.surface.normal)
-
-    def in_space(values: np.ndarray) -> np.ndarray:
-        return np.einsum("mkd,km->md", tangents, np.array([values[rows] for rows in zone.slips]))
-
-    closed, recovered = state.status.closed[zone.numbers], None
-    if field is not None and len(field.tractions):
-        coefficients = -np.array(field.tractions).reshape(len(zone.slips), len(closed), -1)
-        recovered = np.einsum("mtd,tmk->mkd", tangents, coefficients)
-    return ZoneFriction(
-        friction_traction=in_space(-state.pressure),
-        slip=in_space(state.gap),
-        slip_total=in_space(state.friction.total),
-        status=closed.astype(int) + (closed & state.friction.slipping[zone.numbers]),
-        recovered=recovered,
-    )
 
 
 def probed(
@@ -328,11 +282,12 @@ def probed(
 def _on_surface(scene: Scene, zone: ZoneResult, name: str, places: np.ndarray) -> ProbeResult:
     """The contact pressure where a zone's slave surface is nearest to local places (k, dim)."""
     pressure, faces = np.empty(len(places)), [(kind, nodes) for kind, nodes, _ in zone.faces]
+    points = scene.points + scene.coordinates.origin
     for i, face in enumerate(faces_at(scene, name, faces)):
         owner = zone.faces[face.block][2][face.number]
-        at = face.nodes[None], np.array([owner]), face.reference[None]
+        nodes, reference = face.nodes[None], face.reference[None]
         pressure[i] = pressure_on(
-            scene.points + scene.coordinates.origin, zone, face.type.name, *at
+            points, zone, face.type.name, nodes, np.array([owner]), reference
         )[0, 0]
     none = np.full((len(places), 6), np.nan)
     return ProbeResult(

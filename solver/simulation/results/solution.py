@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import meshio
 
     from ...case.model import Case
+    from ...lac.cells.faces import SurfacePoints
 
 # Normals that differ by less are those of a flat surface.
 _FLAT = 1e-9
@@ -110,6 +111,19 @@ class ZoneFriction:
     status: np.ndarray
     recovered: np.ndarray | None = None
 
+    def on_faces(self) -> dict[str, np.ndarray]:
+        """The fields (m, dim) that a grid has of it, by name."""
+        names = "friction_traction", "slip", "slip_total"
+        return {name: getattr(self, name) for name in names}
+
+    def values(self, at: SurfacePoints, pressure: RecoveredPressure | None) -> np.ndarray:
+        """The traction (k, dim) at points of the surface; `pressure`: the zone's recovered one."""
+        mean = self.friction_traction[at.macro]
+        if self.recovered is None or pressure is None:
+            return mean
+        psi = pressure.shapes(at.macro, at.place[:, None])[:, 0]
+        return mean + np.einsum("qk,qkd->qd", psi, self.recovered[at.macro])
+
 
 @dataclass
 class ZoneResult:
@@ -160,6 +174,17 @@ class ZoneResult:
     def shown_status(self) -> np.ndarray:
         """0 open, 1 in contact; with friction 1 stick, 2 slip (m,)."""
         return self.closed.astype(int) if self.friction is None else self.friction.status
+
+    def on_faces(self) -> dict[str, np.ndarray]:
+        """The fields (m, …) that a grid has of its macro-elements, by name."""
+        found = {
+            "pressure": self.multiplier,
+            "gap": self.gap,
+            "status": self.shown_status,
+            "coverage": self.coverage,
+            "pressure_error_estimate": self.pressure_error_estimate,
+        }
+        return found if self.friction is None else found | self.friction.on_faces()
 
     @property
     def pressure_error_estimate(self) -> np.ndarray:
