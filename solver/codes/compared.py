@@ -25,6 +25,7 @@ from .faults import fault, summed_up
 from .model import Model
 from .path import at_last_position
 from .placing import Placed, Placer, flattened
+from .surface_cells import SurfaceCells
 
 if TYPE_CHECKING:
     import meshio
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 # Forces agree within this share: between nodes a pressure is interpolated.
 FORCES = 0.05
 _STEP = 1e-6
+# Normals with smaller components have none along that axis.
+_NO_PART = 1e-9
 
 
 CHECKED_BY = {
@@ -80,8 +83,9 @@ class Compared:
         placed = {name: placer.place(field, name) for name, field in fields.items()}
         if case.moving:
             return cls.of(*at_last_position(placer, placed))
+        sides = SurfaceCells.of(foreign.mesh, placer.points, case.axisymmetric)
         pressures, gaps = (
-            surfaces(model, placed[name], where, name) if name in placed else []
+            surfaces(model, placed[name], sides, where, name) if name in placed else []
             for name in ("pressure", "gap")
         )
         own, elsewhere = None, any((p.node < 0).any() for p in placed.values() if p.own is not None)
@@ -111,15 +115,19 @@ class Compared:
 
     def _norms(self, solution: Solution) -> dict[str, float]:
         """Errors against the exact solution, those that the result gives enough for."""
-        solution = solution if self.own is None else self.own
-        known = [bool(np.isfinite(zone.multiplier).all()) for zone in solution.zones]
-        whole = all(known) and len(known) == len(self.model.case.zones)
-        found = errors(solution if whole else replace(solution, zones=[]))
+        found: dict[str, float] = {}
+        for each in filter(None, (solution, self.own)):
+            known = [bool(np.isfinite(zone.multiplier).all()) for zone in each.zones]
+            whole = all(known) and len(known) == len(self.model.case.zones)
+            of_each = errors(each if whole else replace(each, zones=[]))
+            found |= {name: value for name, value in of_each.items() if np.isfinite(value)}
         means = any(surface.kind == "face" for surface in self.pressures_by_zone)
-        if means and any(zone.recovery != "none" for zone in self.model.case.zones):
+        more = any(zone.recovery != "none" for zone in self.model.case.zones)
+        more |= any(zone.operator.nodes is not None for zone in self.model.scene.zones)
+        if means and more:
             # The case asks for more than means, which the result does not give.
             found = {n: v for n, v in found.items() if n not in ("pressure_l2", "pressure_max")}
-        return {name: value for name, value in found.items() if np.isfinite(value)}
+        return found
 
     def _balance(self) -> dict[str, float]:
         """How far contact forces are from what balances the loads, relative, by zone."""
@@ -127,8 +135,12 @@ class Compared:
         for scene, frame in zip(self.model.scene.zones, self.model.solution.zones, strict=True):
             wanted, scale = self.model.contact_force(scene)
             force = self._force(frame)
+            if force is None or not scale > 0:
+                continue
+            if scene.zone.friction and frame.name not in self.foreign.forces:
+                force, wanted = _along_normal(frame, force, wanted)
             known = np.isfinite(wanted)
-            if force is not None and known.any() and scale > 0:
+            if known.any():
                 off = np.abs(force[known] - wanted[known]).max()
                 self._forces.append((force[known], wanted[known]))
                 found[f"zone {frame.name}: force"] = float(off / scale)
@@ -323,6 +335,20 @@ class Compared:
         return np.concatenate(
             [np.column_stack([s.placed.places, s.placed.values]) for s in self.pressures_by_zone]
         )
+
+
+def _along_normal(
+    zone: ZoneResult, force: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The parts (1,) of forces (dim,) that pressures tell where there is friction.
+
+    NaN where the surface is bent, or the force along its normal is not known.
+    """
+    normal = zone.normal[0]
+    mine = np.abs(normal) > _NO_PART
+    both = (normal[mine] @ each[mine] if zone.flat else np.nan for each in (force, wanted))
+    along, asked = map(np.atleast_1d, both)
+    return along, asked
 
 
 def _place(placed: Placed) -> Callable[[int], str]:

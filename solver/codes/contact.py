@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import meshio
 import numpy as np
@@ -25,14 +26,17 @@ from ..system.errors import InputError
 from ..verification.samples import Reference, Sample, expected_pressure
 from .model import Model
 from .placing import NEAR, Placed
+from .surface_cells import SurfaceCells, corners_of, holding
 
 # A value below this share of the largest is zero: files print zeros in this way.
 _NOTHING = 1e-9
 # How far from the faces of the case, over their size, a curved surface of another mesh may be.
 _SAGITTA = 0.02
 
-# A face whose share under the master is nearer to one or zero counts as whole, or as bare: strains
-# of bodies that slide move its end.
+# So many points of faces are looked at for the face that holds a place.
+_CANDIDATES = 9
+# A face whose share under the master is nearer to one counts as whole: strains of bodies that slide
+# move its end.
 _NEARLY = 0.1
 
 
@@ -89,7 +93,7 @@ class SurfaceValues:
     def _covered(self) -> np.ndarray:
         """Whether the faces around each value (k,) are under the master: 1, 0, or some of both."""
         zone, share = self.zone, self.zone.coverage
-        covered = np.where(share > 1 - _NEARLY, 1.0, 0.5 * (share > _NEARLY))
+        covered = np.where(share > 1 - _NEARLY, 1.0, 0.5 * (share > _NOTHING))
         if self.kind == "face":
             return covered[self.numbers]
         if self.kind == "point":
@@ -101,7 +105,13 @@ class SurfaceValues:
         return (total / np.maximum(count, 1.0))[self.numbers]
 
     def force(self, model: Model) -> np.ndarray | None:
-        """The force (dim,) of the pressure on the slave; None where no area is known."""
+        """The force (dim,) of the pressure on the slave.
+
+        None where no area is known, or the master ends under a face that is pressed.
+        """
+        bare = (self.zone.coverage > _NOTHING) & (self.zone.coverage < 1 - _NEARLY)
+        if (bare & ~(self.zone.multiplier <= 0)).any():
+            return None
         if self.whole:
             return pressure_force(model.points, self.zone, model.case.axisymmetric)
         if self.kind != "point" or self.placed.area is None:
@@ -111,18 +121,24 @@ class SurfaceValues:
         return -np.einsum("k,kd->d", weight, self.zone.normal[near])
 
 
-def surfaces(model: Model, placed: Placed, where: object, name: str) -> list[SurfaceValues]:
+def surfaces(
+    model: Model, placed: Placed, sides: SurfaceCells | None, where: object, name: str
+) -> list[SurfaceValues]:
     """The values of a pressure or gap by zone; those on no slave surface are left out.
 
+    `sides` are the surface cells of the result's own mesh.
     Raises InputError where they are on the master surfaces alone, and where pressures at nodes
     leave corners of slave faces out.
     """
-    owner = _zones_of(model, placed)
+    owner = _zones_of(model, placed, sides)
     _refuse_exchanged(model, placed, owner, where, name)
     found = []
     for number, zone in enumerate(model.solution.zones):
         mine = placed.at(owner == number)
         if not len(mine.places):
+            continue
+        if mine.cells is not None and sides is not None:
+            found.append(_of_cells(model, zone, mine, sides, name))
             continue
         tolerance = NEAR * model.length
         far, face = cKDTree(zone.centre).query(mine.places)
@@ -137,12 +153,15 @@ def surfaces(model: Model, placed: Placed, where: object, name: str) -> list[Sur
     return found
 
 
-def _zones_of(model: Model, placed: Placed) -> np.ndarray:
+def _zones_of(model: Model, placed: Placed, sides: SurfaceCells | None) -> np.ndarray:
     """The zone (k,) whose slave surface each place is on, -1 for none."""
     owner = np.full(len(placed.places), -1)
     for number, zone in enumerate(model.solution.zones):
         nodes = zone.slave_nodes
         mine = (placed.body < 0) | np.isin(placed.body, model.body[nodes])
+        if placed.cells is not None and sides is not None:
+            owner[mine & sides.on(placed.cells, partial(_is_on, model, zone))] = number
+            continue
         at_nodes, near = np.isin(placed.node, nodes), _is_on(model, zone, placed.places)
         if not placed.numbered:  # a place may be at a node of the other side by chance
             owner[at_nodes | near] = number
@@ -201,6 +220,28 @@ def _at_nodes(
     means = at.means(computed_pressure(model.points, filled))
     filled = replace(filled, multiplier=means, gap=np.zeros(len(means)), closed=means > 0)
     return replace(surface, zone=filled)
+
+
+def _of_cells(
+    model: Model, zone: ZoneResult, placed: Placed, sides: SurfaceCells, name: str
+) -> SurfaceValues:
+    """Values of cells: means over slave faces that they fill, else values at their places."""
+    assert placed.cells is not None
+    around = model.case.axisymmetric
+    at = surface_points(model.points, zone.faces, around)
+    corners = np.empty((len(zone.area), 4, model.dim))
+    for kind, nodes, macro in zone.faces:
+        corners[macro] = corners_of(model.points, cell_type(kind), nodes)
+    near = cKDTree(at.place).query(placed.places, k=min(_CANDIDATES, len(at.place)))[1]
+    face = holding(placed.places, corners, at.macro[near])
+    area = np.bincount(at.macro, at.weight)
+    means = sides.means(placed.cells, placed.values, face, area)
+    if means is None:
+        points = replace(placed, area=sides.area[placed.cells])
+        return SurfaceValues(zone, "point", points, np.arange(len(placed.places)))
+    first = np.unique(face, return_index=True)[1]
+    whole = replace(placed.at(first), places=zone.centre, values=means, cells=None)
+    return _at_faces(zone, whole, np.arange(len(means)), name)
 
 
 def _at_faces(zone: ZoneResult, placed: Placed, faces: np.ndarray, name: str) -> SurfaceValues:

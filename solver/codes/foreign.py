@@ -14,13 +14,15 @@ class Field:
     """Values at places, in the coordinates of the undeformed model and the units of the case.
 
     `places` (k, 2 or 3), `values` (k,) or (k, c). `nodes` (k,) are numbers of nodes of the result's
-    own mesh, where the places are nodes; `area` (k,) belongs to each place of a surface, where it
-    is known. NaN: not known there.
+    own mesh, where the places are nodes; `cells` (k,) are those of its cells, block after block,
+    where values are means over cells; `area` (k,) belongs to each place of a surface, where it is
+    known. NaN: not known there.
     """
 
     places: np.ndarray
     values: np.ndarray
     nodes: np.ndarray | None = None
+    cells: np.ndarray | None = None
     area: np.ndarray | None = None
 
 

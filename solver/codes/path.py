@@ -88,4 +88,5 @@ def at_last_position(
 def _moved(field: Field, placed: Placed, frames: Frames) -> Field:
     """The values of a field at their places in the bodies that moved."""
     places = frames.placed(placed.places, placed.body)
-    return replace(field, places=places, values=placed.values, nodes=placed.own, area=placed.area)
+    numbers = {"nodes": placed.own, "cells": placed.cells}
+    return replace(field, places=places, values=placed.values, area=placed.area, **numbers)

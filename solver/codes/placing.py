@@ -39,9 +39,9 @@ UNITS = {1e3: "10³", 1e-3: "10⁻³", 1e6: "10⁶", 1e-6: "10⁻⁶", 1e9: "10�
 class Placed:
     """Values (k, …) at places (k, dim) of the case; `area` (k,) of each place or None.
 
-    `own` (k,) are nodes of the result's own mesh. `numbered`: the result says itself which nodes
-    the places are. `node` (k,) of the case's mesh and `body` (k,) are -1 where no node is
-    there, or the body is unknown because two bodies touch there.
+    `own` (k,) are nodes of the result's own mesh, or `cells` (k,) its cells. `numbered`: the result
+    says itself which nodes or cells the places are. `node` (k,) of the case's mesh and `body` (k,)
+    are -1 where no node is there, or the body is unknown because two bodies touch there.
     """
 
     places: np.ndarray
@@ -51,10 +51,11 @@ class Placed:
     numbered: bool
     area: np.ndarray | None = None
     own: np.ndarray | None = None
+    cells: np.ndarray | None = None
 
     def at(self, chosen: np.ndarray) -> Placed:
         """The chosen places, by mask or number."""
-        named = ("places", "values", "node", "body", "area", "own")
+        named = ("places", "values", "node", "body", "area", "own", "cells")
         arrays = {name: getattr(self, name) for name in named}
         parts: dict[str, Any] = {
             name: None if a is None else a[chosen] for name, a in arrays.items()
@@ -84,8 +85,10 @@ class Placer:
         if mesh is not None and not any(BY_MESHIO[b.type].dim >= model.dim for b in mesh.cells):
             mesh = None
         self.points = None if mesh is None else self._flat(mesh.points, "mesh")
+        self.first = np.empty(0, dtype=int)
         if mesh is None or self.points is None:
             return
+        self.first = np.concatenate([block.data[:, 0] for block in mesh.cells])
         self._refuse_elsewhere(self.points, "mesh", whole=True)
         cells = {str(i): block.data for i, block in enumerate(mesh.cells)}
         own = body_numbers(len(mesh.points), cells)
@@ -110,6 +113,16 @@ class Placer:
             raise self._refused(name, problem)
         values, area = field.values[known], None if field.area is None else field.area[known]
         places = places[known]
+        if field.cells is not None and self.points is not None:
+            cells = field.cells[known]
+            return Placed(
+                places=places,
+                values=values,
+                node=np.full(len(places), -1),
+                body=self.body[self.first[cells]],
+                numbered=True,
+                cells=cells,
+            )
         numbered, own = field.nodes is not None and self.points is not None, None
         if numbered:
             own = np.asarray(field.nodes)[known]
@@ -209,6 +222,8 @@ class Placer:
             centre = zone.operator.surface.centre + self.model.scene.coordinates.origin
             pressure = self.model.reference_pressure(zone)
             pressed.append(centre if pressure is None else centre[pressure > 0])
+        if not sum(map(len, pressed)):
+            return False
         wanted = np.ptp(np.concatenate(pressed), axis=0)
         return bool((np.ptp(places, axis=0) < _REACH * wanted - _ALIKE * self.model.length).any())
 

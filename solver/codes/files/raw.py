@@ -15,13 +15,15 @@ from ...lac.cells.catalogue import BY_MESHIO
 class RawField(NamedTuple):
     """Values (k, c) with the names of their components (empty: not known), and their places.
 
-    `places` (k, 2 or 3); `nodes` (k,) numbers in the mesh of the file, None for other places.
+    `places` (k, 2 or 3); `nodes` or `cells` (k,) are numbers in the mesh of the file, None for
+    other places.
     """
 
     values: np.ndarray
     components: tuple[str, ...]
     places: np.ndarray
     nodes: np.ndarray | None = None
+    cells: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -56,4 +58,5 @@ def at_cells(
     """A field that is given by cell, block by block, at the centres of the cells."""
     flat = [np.asarray(part, dtype=float).reshape(len(part), -1) for part in values]
     centres = [mesh.points[block.data].mean(axis=1) for block in mesh.cells]
-    return RawField(np.concatenate(flat), components, np.concatenate(centres))
+    numbers = np.arange(sum(len(part) for part in flat))
+    return RawField(np.concatenate(flat), components, np.concatenate(centres), cells=numbers)

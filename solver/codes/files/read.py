@@ -232,7 +232,7 @@ def read_result_files(
                 continue
             if quantity in found:
                 raise InputError(file, quantity, None, "is in another file of the result too")
-            found[quantity] = field if raw.mesh is mesh else replace(field, nodes=None)
+            found[quantity] = field if raw.mesh is mesh else replace(field, nodes=None, cells=None)
     if not found:
         there = ", ".join(sorted({name for _, raw in raws for name in raw.fields})) or "none"
         allowed = f"none is known as {', '.join(QUANTITIES)}; fields: {there}; see --map"
@@ -289,6 +289,7 @@ def _field(file: Path, raw: Raw, quantity: str, mapping: ResultMap, where: objec
         places=field.places * length,
         values=numbers * (stress if quantity in ("stress", "pressure") else length),
         nodes=field.nodes,
+        cells=field.cells,
         area=None if area is None else area * length ** (dim - 1),
     )
 

@@ -1,0 +1,56 @@
+"""Our own results, read as those of another code: they pass, and with a fault they do not."""
+
+import h5py
+import numpy as np
+import pytest
+
+from solver import solve_case
+from solver.case.reader import load_case
+from solver.codes.files.read import read_result_files
+from solver.codes.verdicts import check_foreign
+from solver.system.files import seal
+from solver.verification.run import mesh_of
+from tests.codes.results import ROOT
+
+# Values of cells: of faces that are cut, quadratic, rings, under the end of a master or far from
+# it, with a shear that pressures do not tell, with multipliers at nodes, on two zones.
+NAMES = (
+    *("ssnp170/e", "shared/cross-quad4-tria3", "axisymmetric/ring-tria6-quad9"),
+    *("axisymmetric/before-contact", "uncovered/quad8-quad4", "uncovered/tria6-quad9"),
+    *("friction-patch/b-stick", "bending/quad8-tria6-nodal", "bending/tetra10-hexa27"),
+)
+
+
+CASES = [load_case(ROOT / "cases" / f"{name}.yaml") for name in NAMES]
+SOLVES = [(case, False) for case in CASES]
+SOLVES += [(case, True) for case in CASES if case.about.directions == "both"]
+
+
+@pytest.fixture(params=SOLVES, ids=lambda solve: solve[0].as_solved(solve[1]).job)
+def solved(request, tmp_path):
+    """A case as it was solved, and the file of its result."""
+    case, swapped = request.param
+    file = tmp_path / "result.vtkhdf"
+    solve_case(case.path, swapped=swapped).save(file)
+    return case.as_solved(swapped), file
+
+
+def test_the_right_answer_passes(solved):
+    case, file = solved
+    verdict = check_foreign(case, read_result_files([file]), mesh_of(case))
+    assert verdict.verdict == "passed", verdict.reason
+    assert {"displacement", "stress", "pressure", "gap"} == verdict.foreign.compared.keys()
+
+
+def test_a_wrong_pressure_does_not(solved):
+    case, file = solved
+    with h5py.File(file, "a") as content:
+        fields = content["VTKHDF/CellData"]
+        values, covered = fields["pressure"][()], fields["coverage"][()] > 0.99
+        place = np.argmax(np.where(covered, values, -1.0))
+        values[place] += 0.2 * max(values[place], 1.0)
+        fields["pressure"][:] = values
+    seal(file)
+    verdict = check_foreign(case, read_result_files([file]), mesh_of(case))
+    assert verdict.verdict == "failed"
+    assert "multiplier" in verdict.reason or "pressure" in verdict.reason
