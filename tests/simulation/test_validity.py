@@ -108,7 +108,7 @@ def test_bodies_pushed_past_each_other(down, inside):
     assert found.quality.validity.pushed_past == inside
     verdict = judge(found, [])
     assert (verdict.verdict == "unreliable") == bool(inside)
-    assert ("7 cells have their middle inside another body" in verdict.reason) == bool(inside)
+    assert ("the middle of cells (7) is inside another body" in verdict.reason) == bool(inside)
 
 
 @pytest.mark.parametrize("name", [name for name, cell in BY_NAME.items() if cell.dim > 1])

@@ -333,7 +333,7 @@ def limits_passed(case: Case, found: Validity) -> list[str]:
         )
     if found.pushed_past:
         reasons.append(
-            f"{found.pushed_past} cells have their middle inside another body: the bodies were "
+            f"the middle of cells ({found.pushed_past}) is inside another body: the bodies were "
             "pushed past each other where no contact zone, or none within its reach, keeps them "
             "apart"
         )
