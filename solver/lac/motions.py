@@ -97,18 +97,18 @@ def support_resistance(motions: sparse.csc_matrix, basis: sparse.csr_matrix) -> 
 def unsupported(
     motions: sparse.csc_matrix,
     resistance: np.ndarray,
-    springs: sparse.csr_matrix | None = None,
+    ground: sparse.csr_matrix | None = None,
 ) -> sparse.csr_matrix:
     """The rigid motions (n_dofs, k) of each body that the supports leave free.
 
-    `resistance` (r, r) of the supports; `springs` (n_dofs, n_dofs), rows of a stiffness, resist
-    motions too.
+    `resistance` (r, r) of the supports; `ground` (n_dofs, n_dofs), rows of what
+    it adds to the stiffness, resist motions too.
 
     >>> unsupported(sparse.eye(2, format="csc"), np.diag([1.0, 0.0])).toarray().tolist()
     [[0.0], [1.0]]
     """
-    if springs is not None:
-        stretched = springs @ motions
+    if ground is not None:
+        stretched = ground @ motions
         resistance = resistance + (stretched.T @ stretched).toarray()
     values, vectors = np.linalg.eigh(resistance)
     free = values <= _FREE * max(float(values[-1]), np.finfo(float).tiny)

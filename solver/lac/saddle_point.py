@@ -46,7 +46,7 @@ class SaddlePoint:
         gaps: csr_matrix,
         imposed: np.ndarray,
         held: np.ndarray,
-        springs: csr_matrix | None,
+        ground: csr_matrix | None,
     ):
         self.contact, self.size = contact, float(np.ptp(contact.mesh.p))
         self.force, self.free = force, np.setdiff1d(np.arange(len(force)), held)
@@ -54,9 +54,9 @@ class SaddlePoint:
         self.imposed[held] = imposed[held]
         motions = contact._bodies.motions
         at_held = [motions[held]]
-        if springs is not None:
-            at_held.append(springs / abs(springs).max() @ motions)
-            stiffness = stiffness + springs
+        if ground is not None:
+            at_held.append(ground / abs(ground).max() @ motions)
+            stiffness = stiffness + ground
         self.supports = sum((rows.T @ rows).toarray() for rows in at_held)
         self.matrix = stiffness[self.free][:, self.free]
         self.gaps = gaps[:, self.free]

@@ -38,7 +38,7 @@ _WELL_BELOW, _LEAST_GAIN = 0.1, 1e-2
 _GOOD_PIVOT, _SMALLEST_PIVOT = 1e-2, 1e-6
 # Zones whose slave surface is a master surface, one after another.
 _LAYERS = 4
-_NO_SPRINGS = np.empty(0)
+_NO_MORE = np.empty(0)
 
 
 AnyIterate = TypeVar("AnyIterate", bound="Iterate")
@@ -173,12 +173,12 @@ def condense(
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     solvers: Solvers | None = None,
-    springs: np.ndarray = _NO_SPRINGS,
+    extra: np.ndarray = _NO_MORE,
 ) -> CondensedSystem:
     """Condense K x = f under G x = b; `matrix` K (n, n), `constraints` G (m, n).
 
     `own` (n,) marks the unknowns that may be eliminated; `solvers` of K, or factors without any.
-    With `springs` (s,), their stiffnesses, K has s unknowns more; the constraints (m, n + s) may
+    With `extra` (s,), their stiffnesses, K has s unknowns more; the constraints (m, n + s) may
     hold these.
 
     Raises SolveError where a constraint has no unknown of its own, or ZᵀKZ is singular.
@@ -196,14 +196,14 @@ def condense(
     follow = -(inverse @ constraints[:, kept_columns])
     condensed: Symmetric = matrix
     if len(pivot):
-        condensed = _condensed(matrix, kept_columns, pivot, follow, springs)
+        condensed = _condensed(matrix, kept_columns, pivot, follow, extra)
     return CondensedSystem(
         factor=(solvers or Solvers()).prepare(condensed),
         kept=kept_columns,
         follow=follow.tocsr(),
         pivot=pivot,
         inverse=inverse,
-        coupling=_wide(matrix[pivot], len(springs)),
+        coupling=_wide(matrix[pivot], len(extra)),
     )
 
 
@@ -212,15 +212,15 @@ def _condensed(
     kept: np.ndarray,
     pivot: np.ndarray,
     follow: sparse.csr_matrix,
-    springs: np.ndarray,
+    extra: np.ndarray,
 ) -> Symmetric:
-    """ZᵀKZ for the unknowns `kept` (k,), which the others `follow` (m, k); `springs` come last."""
-    s = len(springs)
+    """ZᵀKZ for the unknowns `kept` (k,), which others `follow` (m, k); `extra` ones come last."""
+    s = len(extra)
     coupling = _wide(matrix[pivot], s)
     pulled = (coupling[:, kept].T @ follow).tocsr()
     added = pulled + pulled.T + follow.T @ (coupling[:, pivot] @ follow)
     if s:
-        added = added + sparse.diags(np.concatenate([np.zeros(len(kept) - s), springs]))
+        added = added + sparse.diags(np.concatenate([np.zeros(len(kept) - s), extra]))
     return CondensedMatrix(matrix, kept[: len(kept) - s], added.tocsr())
 
 

@@ -34,8 +34,8 @@ class CondensedMatrix:
     """The rows and columns `kept` (k,) of a stiffness matrix (n, n), plus `added` (k + s, k + s).
 
     Unknowns that were eliminated add a little near the interface. The rest would be a second copy
-    of the stiffness, which the next contact status needs as it is. The last s unknowns are those
-    of springs, which the stiffness does not know.
+    of the stiffness, which the next contact status needs as it is. The last s unknowns are extra
+    ones, which the stiffness does not know: those of stabilised contact.
     """
 
     def __init__(self, stiffness: csr_matrix | NodalMatrix, kept: np.ndarray, added: csr_matrix):
@@ -44,20 +44,20 @@ class CondensedMatrix:
 
     @cached_property
     def eliminated(self) -> np.ndarray:
-        """The other unknowns (n - k,) of the stiffness: at least as many as there are springs."""
+        """The other unknowns (n - k,) of the stiffness: at least as many as extra ones."""
         left = np.ones(self.stiffness.shape[0], dtype=bool)
         left[self.kept] = False
         return np.flatnonzero(left)
 
     @property
-    def springs(self) -> int:
-        """How many of the unknowns are those of springs."""
+    def extra(self) -> int:
+        """How many of the unknowns the stiffness does not know."""
         return self.shape[0] - len(self.kept)
 
     @property
     def places(self) -> np.ndarray:
-        """The unknowns (k + s,) of the stiffness; for springs the first eliminated ones."""
-        return np.concatenate([self.kept, self.eliminated[: self.springs]])
+        """The unknowns (k + s,) of the stiffness; for extra ones the first eliminated ones."""
+        return np.concatenate([self.kept, self.eliminated[: self.extra]])
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """See `Symmetric`."""

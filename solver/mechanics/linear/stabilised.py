@@ -65,8 +65,8 @@ class StabilisedSystem(ConstrainedSystem):
         rows = np.arange(len(system.pivot))
         stiffness = np.asarray(system.coupling[rows, system.pivot]).ravel()
         body = 1 / (stiffness * system.inverse.diagonal() ** 2)
-        springs = scatter.T @ sparse.diags(self.compliance.weight) @ scatter
-        return factorise(sparse.csr_matrix(springs + sparse.diags(body)), least=0.0)
+        soft = scatter.T @ sparse.diags(self.compliance.weight) @ scatter
+        return factorise(sparse.csr_matrix(soft + sparse.diags(body)), least=0.0)
 
     @property
     def _size(self) -> int:
@@ -91,6 +91,5 @@ def stabilise(
     Raises SolveError where a constraint has no unknown of its own, or the system is singular.
     """
     whole = sparse.hstack([constraints, compliance.scatter.T], format="csr")
-    springs = 1 / compliance.weight
-    condensed = condense(matrix, whole, own, solvers, springs)
+    condensed = condense(matrix, whole, own, solvers, extra=1 / compliance.weight)
     return StabilisedSystem(factor=condensed.factor, condensed=condensed, compliance=compliance)

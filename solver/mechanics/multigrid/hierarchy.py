@@ -129,18 +129,18 @@ class Interface:
 
 
 def correction_of(
-    condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarray, springs: int = 0
+    condensed: CondensedMatrix, scale: np.ndarray, place: np.ndarray, extra: int = 0
 ) -> Correction:
     """C of a condensed matrix, scaled by `scale` (n,); unknown i is in row `place[i]`.
 
-    So many `springs` are in the rows of eliminated unknowns; the others are held.
+    So many `extra` ones are in the rows of eliminated unknowns; the others are held.
     """
     stiffness, pivot = condensed.stiffness, condensed.eliminated
-    size = len(condensed.kept) + springs
+    size = len(condensed.kept) + extra
     own, scales = place[condensed.places[:size]], scales_of(condensed, scale)
     rows = np.flatnonzero(np.diff(condensed.added.indptr[: size + 1]))
     rows = rows[np.argsort(own[rows])]
-    added = condensed.added[rows] if springs == condensed.springs else condensed.added[rows, :size]
+    added = condensed.added[rows] if extra == condensed.extra else condensed.added[rows, :size]
     gone = stiffness[pivot]
     gone.eliminate_zeros()
     gone = gone.tocoo()
@@ -180,9 +180,9 @@ def _without_empty_columns(rows: csr_matrix) -> tuple[np.ndarray, csr_matrix]:
 
 
 def scales_of(condensed: CondensedMatrix, scale: np.ndarray) -> np.ndarray:
-    """The scale (k + s,): of the stiffness (n,), and for springs to a diagonal of one."""
-    springs = condensed.added.diagonal()[len(condensed.kept) :]
-    return np.concatenate([scale[condensed.kept], 1 / np.sqrt(springs)])
+    """The scale (k + s,): of the stiffness (n,), and for extra unknowns to a diagonal of one."""
+    own = condensed.added.diagonal()[len(condensed.kept) :]
+    return np.concatenate([scale[condensed.kept], 1 / np.sqrt(own)])
 
 
 def _own_diagonal(rows: csr_matrix, numbers: np.ndarray) -> np.ndarray:
@@ -268,7 +268,8 @@ class Level:
     ) -> "Level":
         """The level under contact, with an exact solve of up to `most` unknowns beside it.
 
-        Where there are springs, this solve is the one of the correction `beside`, which has them.
+        Where there are extra unknowns, this solve is the one of the correction `beside`, which
+        has them.
         """
         own = self.matrix.chosen_rows(correction.rows)
         rows = correction.corrected_rows(own)

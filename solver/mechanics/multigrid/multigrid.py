@@ -38,16 +38,16 @@ class ScaledSystem:
     def __init__(self, matrix: Symmetric, scale: np.ndarray, place: np.ndarray, size: int):
         """`scale` and `place` of `matrix`, or of the stiffness that it is condensed from.
 
-        Springs are in the rows of the first eliminated unknowns.
+        Extra unknowns are in the rows of the first eliminated ones.
         """
         self._matrix, self.scale, self.place, self._size = matrix, scale, place, size
         self._added: csr_matrix | None = None
-        self._springs = place[:0]
+        self._extra = place[:0]
         stiffness = matrix
         if isinstance(matrix, CondensedMatrix):
             stiffness, self.place = matrix.stiffness, place[matrix.places]
             self.scale = scales_of(matrix, scale)
-            self._springs = self.place[len(matrix.kept) :]
+            self._extra = self.place[len(matrix.kept) :]
             self._add(matrix.added)
         idle = np.ones(size, dtype=bool)
         idle[self.place] = False
@@ -90,14 +90,14 @@ class ScaledSystem:
         if self._blocks is None:
             return self.lifted(self._matrix @ self.solution(x))
         bodies = x if self._around is None else self._around * x
-        if len(self._springs):
+        if len(self._extra):
             # The stiffness does not know what is in these rows.
             bodies = bodies.copy() if bodies is x else bodies
-            bodies[self._springs] = 0
+            bodies[self._extra] = 0
         found = self._blocks.multiply(bodies)
         if self._around is not None:
             found *= self._around
-        found[self._idle] = found[self._springs] = 0
+        found[self._idle] = found[self._extra] = 0
         if self._added is not None:
             found[self._rows] += self._added @ x[self._rows]
         return found
@@ -170,15 +170,15 @@ class Multigrid:
     def _correct(self, condensed: CondensedMatrix, hierarchy: Hierarchy) -> Correction:
         """The levels under contact; return the correction of the last one.
 
-        Coarse levels hold springs. These, and constraints that were added with a weight, need the
-        exact solve beside contact.
+        Coarse levels hold extra unknowns. These, and constraints that were added with a weight,
+        need the exact solve beside contact.
         """
         scale, place = hierarchy.scale, hierarchy.place
         correction, beside = correction_of(condensed, scale, place), None
-        needed = condensed.springs or not len(condensed.eliminated)
+        needed = condensed.extra or not len(condensed.eliminated)
         self._levels, most = [], np.inf if needed else _MOST_BESIDE * hierarchy.size
-        if condensed.springs:
-            beside = correction_of(condensed, scale, place, condensed.springs)
+        if condensed.extra:
+            beside = correction_of(condensed, scale, place, condensed.extra)
         if not hierarchy.levels:
             return beside or correction
         finest, *coarser = hierarchy.levels
