@@ -25,6 +25,7 @@ from ..system.errors import InputError
 if TYPE_CHECKING:
     from ..simulation.scene.attributes import Attributes
     from .foreign import Field, ForeignResult
+    from .model import Model
     from .placing import Placed, Placer
 
 
@@ -64,12 +65,13 @@ def at_last_position(
     for name, values in placed.items():
         if (values.body < 0).any():
             raise InputError(where, name, None, "each value needs its body where bodies move far")
-    frames = Frames.still(int(model.body.max()) + 1, model.dim)
+    frames, weight = Frames.still(int(model.body.max()) + 1, model.dim), _of_contact(model)
     for number in np.unique(moved.body).tolist():
         mine = moved.body == number
-        places = moved.places[mine]
+        places, share = moved.places[mine], weight[moved.node[mine]]
         now = places + moved.values[mine, : model.dim]
-        frames = frames.following(number, places, now, around_axis=model.case.axisymmetric)
+        around, share = model.case.axisymmetric, share if share.any() else np.ones(len(share))
+        frames = frames.following(number, places, now, share, around)
     fields: dict[str, Any] = {
         name: _moved(getattr(foreign, name), of, frames) for name, of in placed.items()
     }
@@ -83,6 +85,19 @@ def at_last_position(
     mesh = replace(model.case.mesh, selections=())
     then = replace(model.case, motion="small", steps=model.case.steps[-1:], mesh=mesh)
     return then, replace(foreign, mesh=own, step=None, **fields), there
+
+
+def _of_contact(model: Model) -> np.ndarray:
+    """By how many faces of contact each node (n + 1,) has: what frames follow in a solve of ours.
+
+    Shear turns a body as a whole, but not its flat surface. The last one is for places at no node.
+    """
+    weight = np.zeros(len(model.points) + 1)
+    for zone in model.solution.zones:
+        slave = [(kind, nodes) for kind, nodes, _ in zone.faces]
+        for _, nodes in (*slave, *zone.master_faces):
+            np.add.at(weight, nodes, 1.0)
+    return weight
 
 
 def _moved(field: Field, placed: Placed, frames: Frames) -> Field:

@@ -61,6 +61,15 @@ def test_a_right_result_is_compared_where_its_bodies_are(slid):
     assert found.foreign.compared["stress"] == f"{len(mesh.points)} of {len(mesh.points)} nodes"
 
 
+def test_shear_by_friction_turns_no_frame():
+    """It turns a body as a whole, but not the surface that slides."""
+    case = load_case(CASES / "slide-c-friction.yaml")
+    mesh = mesh_of(case)
+    found = check_foreign(case, as_foreign(case, mesh), mesh)
+    assert found.verdict == "passed", found.reason
+    assert max(check.error for check in found.checks) < 1e-9
+
+
 def test_what_is_wrong_at_the_last_position_fails(slid):
     case, mesh, foreign = slid
     values = foreign.pressure.values.copy()
