@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import meshio
 import numpy as np
@@ -25,14 +24,12 @@ from ..simulation.results.solution import NodalContact, Solution, ZoneResult
 from ..system.errors import InputError
 from ..verification.samples import Reference, Sample, expected_pressure
 from .model import Model
+from .on_surfaces import faces_at, on_zones, where_zones_meet
 from .placing import NEAR, Placed
 from .surface_cells import SurfaceCells, corners_of, holding
 
 # A value below this share of the largest is zero: files print zeros in this way.
 _NOTHING = 1e-9
-# How far from the faces of the case, over their size, a curved surface of another mesh may be.
-_SAGITTA = 0.02
-
 # So many points of faces are looked at for the face that holds a place.
 _CANDIDATES = 9
 # A face whose share under the master is nearer to one counts as whole: strains of bodies that slide
@@ -130,76 +127,59 @@ def surfaces(
     Raises InputError where they are on the master surfaces alone, and where pressures at nodes
     leave corners of slave faces out.
     """
-    owner = _zones_of(model, placed, sides)
-    _refuse_exchanged(model, placed, owner, where, name)
+    on = on_zones(model, placed, sides)
+    _refuse_exchanged(model, placed, np.asarray(on.any(axis=0)), where, name)
     found = []
     for number, zone in enumerate(model.solution.zones):
-        mine = placed.at(owner == number)
+        mine, common = placed.at(on[number]), on[:, on[number]].sum(axis=0) > 1
         if not len(mine.places):
             continue
         if mine.cells is not None and sides is not None:
             found.append(_of_cells(model, zone, mine, sides, name))
             continue
         tolerance = NEAR * model.length
-        far, face = cKDTree(zone.centre).query(mine.places)
-        each = len(np.unique(face)) == len(face) == len(zone.centre)
+        face = None if placed.numbered else faces_at(model, zone, mine.places)
         apart, node = cKDTree(model.points[zone.slave_nodes]).query(mine.places)
-        if not placed.numbered and each and (far < tolerance).all():
+        if face is not None:
             found.append(_at_faces(zone, mine, face, name))
         elif (apart < tolerance).all():
-            found.append(_at_nodes(model, zone, mine, zone.slave_nodes[node], name, where))
+            nodes = zone.slave_nodes[node]
+            surface = _at_nodes(model, zone, mine, nodes, common, name, where)
+            alone = ~where_zones_meet(model, number, mine.places)
+            found.append(replace(surface, placed=mine.at(alone), numbers=nodes[alone]))
         else:
             found.append(SurfaceValues(zone, "point", mine, np.arange(len(mine.places))))
     return found
 
 
-def _zones_of(model: Model, placed: Placed, sides: SurfaceCells | None) -> np.ndarray:
-    """The zone (k,) whose slave surface each place is on, -1 for none."""
-    owner = np.full(len(placed.places), -1)
-    for number, zone in enumerate(model.solution.zones):
-        nodes = zone.slave_nodes
-        mine = (placed.body < 0) | np.isin(placed.body, model.body[nodes])
-        if placed.cells is not None and sides is not None:
-            owner[mine & sides.on(placed.cells, partial(_is_on, model, zone))] = number
-            continue
-        at_nodes, near = np.isin(placed.node, nodes), _is_on(model, zone, placed.places)
-        if not placed.numbered:  # a place may be at a node of the other side by chance
-            owner[at_nodes | near] = number
-        else:
-            owner[mine & np.where(placed.node >= 0, at_nodes, near)] = number
-    return owner
-
-
-def _is_on(model: Model, zone: ZoneResult, places: np.ndarray) -> np.ndarray:
-    """Which places (k,) are on a slave surface, by their distance from its faces."""
-    at = surface_points(model.points, zone.faces)
-    near = cKDTree(at.place).query(places)[1]
-    face = at.macro[near]
-    size = model.face_size(zone)[face]
-    offset = places - at.place[near]
-    across = np.abs(np.einsum("kd,kd->k", offset, zone.normal[face]))
-    return (across < _SAGITTA * size) & (np.linalg.norm(offset, axis=1) < size)
-
-
 def _refuse_exchanged(
-    model: Model, placed: Placed, owner: np.ndarray, where: object, name: str
+    model: Model, placed: Placed, on: np.ndarray, where: object, name: str
 ) -> None:
     """Refuse values that are on the master side alone."""
     size = np.abs(placed.values)
-    if size[owner >= 0].max(initial=0.0) > _NOTHING * size.max() or (owner >= 0).all():
+    if size[on].max(initial=0.0) > _NOTHING * size.max() or on.all():
         return
     masters = [zone.master_nodes for zone in model.solution.zones]
     if name == "pressure" and np.isin(placed.node[size > 0], np.concatenate(masters)).any():
         problem = "is on the master surface: slave and master are exchanged (option --swap)"
         raise InputError(where, name, None, problem)
-    if not (owner >= 0).any():
+    if not on.any():
         raise InputError(where, name, None, "no value of it is on a slave surface")
 
 
 def _at_nodes(
-    model: Model, zone: ZoneResult, placed: Placed, nodes: np.ndarray, name: str, where: object
+    model: Model,
+    zone: ZoneResult,
+    placed: Placed,
+    nodes: np.ndarray,
+    common: np.ndarray,
+    name: str,
+    where: object,
 ) -> SurfaceValues:
-    """Values at slave nodes; pressures on the whole surface."""
+    """Values at slave nodes; pressures on the whole surface.
+
+    A value that is `common` (k,) to zones is one of two pressures: then the whole is not known.
+    """
     count = np.bincount(nodes, minlength=len(model.points))
     mean = np.bincount(nodes, placed.values, len(model.points)) / np.maximum(count, 1)
     vertices = np.unique(
@@ -213,6 +193,8 @@ def _at_nodes(
         problem = f"{missed}: it must be 0 where there is no contact"
         raise InputError(where, name, None, problem)
     known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
+    if common.any():
+        return surface
     nothing = np.zeros(len(known))
     nodal = NodalContact(known, mean[known], nothing, mean[known] > 0)
     filled = replace(zone, nodal=nodal)

@@ -104,6 +104,8 @@ class Placer:
 
     def place(self, field: Field, name: str) -> Placed:
         """The values of a field on the case; NaN, where there may be no value, is left out."""
+        if name in CONTACT and not self.model.case.zones:
+            raise self._refused(name, "the case has no contact zone")
         places = self._flat(field.places, name)
         known = np.isfinite(field.values.reshape(len(places), -1)).all(axis=1)
         if not known.any():

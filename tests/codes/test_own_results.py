@@ -1,5 +1,7 @@
 """Our own results, read as those of another code: they pass, and with a fault they do not."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -7,7 +9,11 @@ import pytest
 from solver import solve_case
 from solver.case.reader import load_case
 from solver.codes.files.read import read_result_files
+from solver.codes.foreign import Field, ForeignResult
+from solver.codes.model import Model
 from solver.codes.verdicts import check_foreign
+from solver.lac.cells.catalogue import cell_type
+from solver.system.errors import InputError
 from solver.system.files import seal
 from solver.verification.run import mesh_of
 from tests.codes.results import ROOT
@@ -54,3 +60,46 @@ def test_a_wrong_pressure_does_not(solved):
     verdict = check_foreign(case, read_result_files([file]), mesh_of(case))
     assert verdict.verdict == "failed"
     assert "multiplier" in verdict.reason or "pressure" in verdict.reason
+
+
+def pressures(name):
+    """A case, its model, and the exact pressure at the middles of its slave faces, by zone."""
+    case = load_case(ROOT / "cases" / f"{name}.yaml")
+    model = Model.of(case, mesh_of(case))
+    return case, model, [model.reference_pressure(zone) for zone in model.scene.zones]
+
+
+@pytest.mark.parametrize("table", [False, True])
+@pytest.mark.parametrize(
+    "name", ["cross-hexa8-tetra10", "corner-quad4-tria6", "junction-quad8-tria3"]
+)
+def test_where_zones_meet_a_value_at_a_node_is_of_neither(name, table):
+    case, model, exact = pressures(f"shared/{name}")
+    values = np.full(len(model.points), np.nan)
+    for zone, pressure in zip(model.solution.zones, exact, strict=True):
+        values[zone.slave_nodes] = pressure[0]
+    nodes = np.flatnonzero(np.isfinite(values))
+    given = Field(places=model.points[nodes], values=values[nodes], nodes=None if table else nodes)
+    result = ForeignResult(code="mine", mesh=None if table else model.mesh, pressure=given)
+    verdict = check_foreign(case, result, model.mesh, only=["pressure"])
+    assert verdict.verdict == "passed", verdict.reason
+
+
+@pytest.mark.parametrize("name", ["axisymmetric/ring-tria6-quad9", "lame/spheres-hexa20"])
+def test_the_middle_of_a_face_is_that_of_its_corners_too(name):
+    case, model, [exact] = pressures(name)
+    [zone] = model.solution.zones
+    places = np.empty_like(zone.centre)
+    for kind, nodes, macro in zone.faces:
+        places[macro] = model.points[nodes[:, : cell_type(kind).n_vertices]].mean(axis=1)
+    result = ForeignResult(code="mine", pressure=Field(places=places, values=exact))
+    verdict = check_foreign(case, result, model.mesh, only=["pressure"])
+    assert verdict.verdict == "passed", verdict.reason
+
+
+def test_pressures_need_contact():
+    case = load_case(ROOT / "cases/ssnp170/a.yaml")
+    case, mesh = replace(case, zones=()), mesh_of(case)
+    given = Field(places=mesh.points, values=np.zeros(len(mesh.points)))
+    with pytest.raises(InputError, match="pressure: the case has no contact zone"):
+        check_foreign(case, ForeignResult(code="mine", pressure=given), mesh)
