@@ -342,13 +342,13 @@ def _along_normal(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The parts (1,) of forces (dim,) that pressures tell where there is friction.
 
-    NaN where the surface is bent, or the force along its normal is not known.
+    NaN where the surface is bent, or the wanted force along its normal is not known.
     """
+    if not zone.flat:
+        return np.full(1, np.nan), np.full(1, np.nan)
     normal = zone.normal[0]
     mine = np.abs(normal) > _NO_PART
-    both = (normal[mine] @ each[mine] if zone.flat else np.nan for each in (force, wanted))
-    along, asked = map(np.atleast_1d, both)
-    return along, asked
+    return np.array([normal[mine] @ force[mine]]), np.array([normal[mine] @ wanted[mine]])
 
 
 def _place(placed: Placed) -> Callable[[int], str]:

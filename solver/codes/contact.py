@@ -192,9 +192,9 @@ def _at_nodes(
         missed = f"{missing} of {len(vertices)} corners of the slave faces have none"
         problem = f"{missed}: it must be 0 where there is no contact"
         raise InputError(where, name, None, problem)
-    known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
     if common.any():
         return surface
+    known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
     nothing = np.zeros(len(known))
     nodal = NodalContact(known, mean[known], nothing, mean[known] > 0)
     filled = replace(zone, nodal=nodal)

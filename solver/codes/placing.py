@@ -85,10 +85,11 @@ class Placer:
         if mesh is not None and not any(BY_MESHIO[b.type].dim >= model.dim for b in mesh.cells):
             mesh = None
         self.points = None if mesh is None else self._flat(mesh.points, "mesh")
-        self.first = np.empty(0, dtype=int)
+        self.first: np.ndarray | None = None
         if mesh is None or self.points is None:
             return
-        self.first = np.concatenate([block.data[:, 0] for block in mesh.cells])
+        if all(BY_MESHIO[b.type].dim <= model.dim for b in mesh.cells):  # no layer of a plane case
+            self.first = np.concatenate([block.data[:, 0] for block in mesh.cells])
         self._refuse_elsewhere(self.points, "mesh", whole=True)
         cells = {str(i): block.data for i, block in enumerate(mesh.cells)}
         own = body_numbers(len(mesh.points), cells)
@@ -115,7 +116,7 @@ class Placer:
             raise self._refused(name, problem)
         values, area = field.values[known], None if field.area is None else field.area[known]
         places = places[known]
-        if field.cells is not None and self.points is not None:
+        if field.cells is not None and self.first is not None:
             cells = field.cells[known]
             return Placed(
                 places=places,

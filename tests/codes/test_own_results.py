@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import h5py
+import meshio
 import numpy as np
 import pytest
 
@@ -103,3 +104,26 @@ def test_pressures_need_contact():
     given = Field(places=mesh.points, values=np.zeros(len(mesh.points)))
     with pytest.raises(InputError, match="pressure: the case has no contact zone"):
         check_foreign(case, ForeignResult(code="mine", pressure=given), mesh)
+
+
+def test_pressures_on_the_sides_of_a_layer():
+    """A plane case as a layer of hexahedra, whose upright sides are the faces of contact."""
+    case = load_case(ROOT / "cases/ssnp170/c.yaml")
+    mesh = mesh_of(case)
+    flat = np.pad(mesh.points, ((0, 0), (0, 1)))
+    squares, lines = (
+        next(block.data for block in mesh.cells if block.type == kind) for kind in ("quad", "line")
+    )
+    chosen = mesh.cell_sets[case.zones[0].slave][[b.type for b in mesh.cells].index("line")]
+    sides, above = lines[np.asarray(chosen, dtype=int)], len(flat)
+    cells = [
+        ("hexahedron", np.hstack([squares, squares + above])),
+        ("quad", np.hstack([sides, sides[:, ::-1] + above])),
+    ]
+    layer = meshio.Mesh(np.concatenate([flat, flat + [0.0, 0.0, 1.0]]), cells)
+    values = np.repeat([np.nan, 25.0], [len(squares), len(sides)])
+    places = np.concatenate([layer.points[data].mean(axis=1) for _, data in cells])
+    given = Field(places=places, values=values, cells=np.arange(len(values)))
+    result = ForeignResult(code="mine", mesh=layer, pressure=given)
+    verdict = check_foreign(case, result, mesh, only=["pressure"])
+    assert verdict.verdict == "passed", verdict.reason
