@@ -120,7 +120,7 @@ def test_pressures_on_the_sides_of_a_layer():
         ("hexahedron", np.hstack([squares, squares + above])),
         ("quad", np.hstack([sides, sides[:, ::-1] + above])),
     ]
-    layer = meshio.Mesh(np.concatenate([flat, flat + [0.0, 0.0, 1.0]]), cells)
+    layer = meshio.Mesh(np.concatenate([flat, flat + np.array([0.0, 0.0, 1.0])]), cells)
     values = np.repeat([np.nan, 25.0], [len(squares), len(sides)])
     places = np.concatenate([layer.points[data].mean(axis=1) for _, data in cells])
     given = Field(places=places, values=values, cells=np.arange(len(values)))

@@ -219,9 +219,9 @@ class Multigrid:
                 _LOG.info("slow iterations: coarse levels take two steps each")
                 self._shared.slow = True
 
-        lifted, most = system.lifted(right), MAX_ITERATIONS
+        lifted = system.lifted(right)
         solution, iterations = conjugate_gradients(
-            system.multiply, self._precondition, lifted, accuracy, most, watch
+            system.multiply, self._precondition, lifted, accuracy, MAX_ITERATIONS, watch
         )
         if not np.isfinite(solution).all():
             raise SolveError(f"the solution by {self.name} is not finite")
