@@ -8,7 +8,7 @@ import pytest
 from solver.case.reader import parse_case
 from solver.lac import segments
 from solver.mesh import transform
-from solver.simulation.results.balance import _extent
+from solver.simulation.results.balance import extent
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -148,7 +148,7 @@ def test_contact_of_the_macro_element_at_the_axis():
     scene = build_scene(case(), mesh("QUAD4", "QUAD4", 0.0))
     [zone] = scene.zones
     closed = zone.operator.surface.centre[:, 0] < 0.25
-    edges, area = _extent(scene, zone, 25.0 * closed, closed)
+    edges, area = extent(scene, zone, 25.0 * closed, closed)
     assert closed.sum() == 1
     assert edges.lower == pytest.approx(np.array([[0.0, 0.0]]), abs=1e-12)
     assert area == pytest.approx(np.pi * 0.0625 * np.array([1, 0, 4]), abs=1e-12)
@@ -164,7 +164,7 @@ def test_contact_of_single_macro_elements_is_between_none_and_all(closed, units)
     [zone] = scene.zones
     order = np.argsort(zone.operator.surface.centre[:, 0])
     status = np.isin(np.arange(4), order[closed])
-    _, area = _extent(scene, zone, 25.0 * status, status)
+    _, area = extent(scene, zone, 25.0 * status, status)
     assert area == pytest.approx(np.pi / 16 * np.array(units), abs=1e-12)
 
 
