@@ -2,6 +2,7 @@
 
 import ast
 from collections import Counter
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -11,9 +12,14 @@ SOURCES = ROOT / "solver"
 LONGEST, ENTRIES = 400, 12
 
 
+@cache
+def parsed(file):
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
 def test_imports_within_the_package_are_relative():
     for file in SOURCES.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(file)):
             named = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             if isinstance(node, ast.ImportFrom) and not node.level:
                 named = [node.module]
@@ -22,7 +28,7 @@ def test_imports_within_the_package_are_relative():
 
 def imported(file):
     """The files of the package that a file imports, in functions and for type checkers too."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(file)):
         if isinstance(node, ast.ImportFrom) and node.level:
             place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
             names = [place / alias.name for alias in node.names]
@@ -37,7 +43,7 @@ def test_no_files_import_each_other_in_a_circle():
 
 
 def test_no_two_classes_share_a_name():
-    trees = (ast.parse(file.read_text(encoding="utf-8")) for file in SOURCES.rglob("*.py"))
+    trees = (parsed(file) for file in SOURCES.rglob("*.py"))
     classes = [
         node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
     ]

@@ -25,7 +25,6 @@ from .faults import fault, summed_up
 from .model import Model
 from .path import at_last_position
 from .placing import Placed, Placer, flattened
-from .surface_cells import SurfaceCells
 
 if TYPE_CHECKING:
     import meshio
@@ -83,9 +82,10 @@ class Compared:
         placed = {name: placer.place(field, name) for name, field in fields.items()}
         if case.moving:
             return cls.of(*at_last_position(placer, placed))
-        sides = SurfaceCells.of(foreign.mesh, placer.points, case.axisymmetric)
         pressures, gaps = (
-            surfaces(model, placed[name], sides, where, name) if name in placed else []
+            surfaces(model, placed[name], placer.sides(placed[name]), where, name)
+            if name in placed
+            else []
             for name in ("pressure", "gap")
         )
         own, elsewhere = None, any((p.node < 0).any() for p in placed.values() if p.own is not None)

@@ -123,7 +123,7 @@ def surfaces(
 ) -> list[SurfaceValues]:
     """The values of a pressure or gap by zone; those on no slave surface are left out.
 
-    `sides` are the surface cells of the result's own mesh.
+    `sides`: the cells of the result's own mesh that they belong to.
     Raises InputError where they are on the master surfaces alone, and where pressures at nodes
     leave corners of slave faces out.
     """
@@ -134,8 +134,8 @@ def surfaces(
         mine, common = placed.at(on[number]), on[:, on[number]].sum(axis=0) > 1
         if not len(mine.places):
             continue
-        if mine.cells is not None and sides is not None:
-            found.append(_of_cells(model, zone, mine, sides, name))
+        if sides is not None:
+            found.append(_of_cells(model, zone, mine, sides.at(on[number]), name))
             continue
         tolerance = NEAR * model.length
         face = None if placed.numbered else faces_at(model, zone, mine.places)
@@ -208,18 +208,16 @@ def _of_cells(
     model: Model, zone: ZoneResult, placed: Placed, sides: SurfaceCells, name: str
 ) -> SurfaceValues:
     """Values of cells: means over slave faces that they fill, else values at their places."""
-    assert placed.cells is not None
-    around = model.case.axisymmetric
-    at = surface_points(model.points, zone.faces, around)
+    at = surface_points(model.points, zone.faces, model.case.axisymmetric)
     corners = np.empty((len(zone.area), 4, model.dim))
     for kind, nodes, macro in zone.faces:
         corners[macro] = corners_of(model.points, cell_type(kind), nodes)
     near = cKDTree(at.place).query(placed.places, k=min(_CANDIDATES, len(at.place)))[1]
     face = holding(placed.places, corners, at.macro[near])
     area = np.bincount(at.macro, at.weight)
-    means = sides.means(placed.cells, placed.values, face, area)
+    means = sides.means(placed.values, face, area)
     if means is None:
-        points = replace(placed, area=sides.area[placed.cells])
+        points = replace(placed, area=sides.area)
         return SurfaceValues(zone, "point", points, np.arange(len(placed.places)))
     first = np.unique(face, return_index=True)[1]
     whole = replace(placed.at(first), places=zone.centre, values=means, cells=None)

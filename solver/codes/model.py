@@ -10,7 +10,9 @@ import meshio
 import numpy as np
 
 from ..case.model import Case
+from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import FaceBlock, nodal_normals, surface_nodes, surface_points
+from ..lac.cells.shape import shape_functions
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.records import Cost, Fields, Scalars
 from ..simulation.results.results import body_infos
@@ -126,6 +128,18 @@ class Model:
         """Unit normals (n, dim) at the nodes of one side, zero elsewhere."""
         faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
         return nodal_normals(self.points, list(faces))
+
+    def middles(self, zone: ZoneResult) -> np.ndarray:
+        """The middles (4, m, dim) of slave faces: of area, shapes, corners and all nodes."""
+        found = np.stack([zone.centre] * 4)
+        for name, nodes, macro in zone.faces:
+            kind = cell_type(name)
+            reference = kind.nodes[: kind.n_vertices].mean(axis=0)
+            weights = shape_functions(name).values(reference[None])[0]
+            found[1, macro] = weights @ self.points[nodes]
+            found[2, macro] = self.points[nodes[:, : kind.n_vertices]].mean(axis=1)
+            found[3, macro] = self.points[nodes].mean(axis=1)
+        return found
 
     def face_size(self, zone: ZoneResult) -> np.ndarray:
         """How wide the slave faces (m,) of a zone are."""

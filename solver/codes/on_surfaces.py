@@ -7,9 +7,7 @@ from functools import partial
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import surface_points
-from ..lac.cells.shape import shape_functions
 from ..mechanics.fem.locate import locate
 from ..simulation.results.solution import ZoneResult
 from .model import Model
@@ -20,22 +18,9 @@ from .surface_cells import SurfaceCells
 _SAGITTA = 0.02
 
 
-def _middles(model: Model, zone: ZoneResult) -> np.ndarray:
-    """The middles (4, m, dim) of slave faces: of area, shape functions, corners and all nodes."""
-    found = np.stack([zone.centre] * 4)
-    for name, nodes, macro in zone.faces:
-        kind = cell_type(name)
-        reference = kind.nodes[: kind.n_vertices].mean(axis=0)
-        weights = shape_functions(name).values(reference[None])[0]
-        found[1, macro] = weights @ model.points[nodes]
-        found[2, macro] = model.points[nodes[:, : kind.n_vertices]].mean(axis=1)
-        found[3, macro] = model.points[nodes].mean(axis=1)
-    return found
-
-
 def faces_at(model: Model, zone: ZoneResult, places: np.ndarray) -> np.ndarray | None:
     """The slave face (m,) that each place is the middle of; None where they are not these."""
-    for middle in _middles(model, zone):
+    for middle in model.middles(zone):
         far, face = cKDTree(middle).query(places)
         each = len(np.unique(face)) == len(face) == len(middle)
         if each and (far < NEAR * model.length).all():
@@ -61,8 +46,8 @@ def on_zones(model: Model, placed: Placed, sides: SurfaceCells | None) -> np.nda
         nodes = zone.slave_nodes
         mine = (placed.body < 0) | np.isin(placed.body, model.body[nodes])
         apart = _apart(model, zone, placed.places)
-        if placed.cells is not None and sides is not None:
-            on = sides.on(placed.cells, partial(_is_on, model, zone))
+        if sides is not None:
+            on = sides.on(partial(_is_on, model, zone))
             away[number] = np.where(mine & on, apart, np.inf)
             continue
         # Without numbers a place may be at a node of the other side by chance.
@@ -87,7 +72,7 @@ def _apart(model: Model, zone: ZoneResult, places: np.ndarray) -> np.ndarray:
     face = at.macro[near]
     size = model.face_size(zone)[face]
     across = np.abs(np.einsum("kd,kd->k", places - at.place[near], zone.normal[face]))
-    middles = np.concatenate(_middles(model, zone))
+    middles = np.concatenate(model.middles(zone))
     middle = cKDTree(middles).query(places)[0] < NEAR * model.length
     on = middle | ((across < _SAGITTA * size) & (apart < size))
     return np.where(on, np.where(middle, 0.0, apart), np.inf)

@@ -70,8 +70,7 @@ def at_last_position(
         mine = moved.body == number
         places, share = moved.places[mine], weight[moved.node[mine]]
         now = places + moved.values[mine, : model.dim]
-        around, share = model.case.axisymmetric, share if share.any() else np.ones(len(share))
-        frames = frames.following(number, places, now, share, around)
+        frames = frames.following(number, places, now, share, model.case.axisymmetric)
     fields: dict[str, Any] = {
         name: _moved(getattr(foreign, name), of, frames) for name, of in placed.items()
     }

@@ -20,6 +20,7 @@ from ..lac.motions import body_numbers
 from ..system.errors import InputError
 from .foreign import Field, ForeignResult
 from .model import Model
+from .surface_cells import SurfaceCells
 
 # Places agree within this share of the model's length: files give six digits at times.
 NEAR = 2e-5
@@ -147,6 +148,13 @@ class Placer:
             own=own,
         )
 
+    def sides(self, placed: Placed) -> SurfaceCells | None:
+        """The cells that values belong to; None for values at places."""
+        if placed.cells is None or self.foreign.mesh is None or self.points is None:
+            return None
+        around = self.model.case.axisymmetric
+        return SurfaceCells.of(self.foreign.mesh, self.points, placed.cells, around)
+
     def _lacks(self, field: Field, known: np.ndarray, name: str) -> bool:
         """Whether nodes of bodies that deform have no displacement or stress."""
         if name in CONTACT or field.nodes is None or self.points is None:
@@ -213,9 +221,9 @@ class Placer:
             raise self._refused(name, problem)
 
     def _at_faces(self, places: np.ndarray) -> bool:
-        """Whether all places are centres of slave faces."""
-        zones = self.model.solution.zones
-        distance = cKDTree(np.concatenate([z.centre for z in zones])).query(places)[0]
+        """Whether all places are middles of slave faces."""
+        middles = [each for z in self.model.solution.zones for each in self.model.middles(z)]
+        distance = cKDTree(np.concatenate(middles)).query(places)[0]
         return bool((distance < self.near).all())
 
     def _misses_contact(self, places: np.ndarray) -> bool:

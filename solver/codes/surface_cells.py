@@ -50,7 +50,7 @@ def holding(places: np.ndarray, corners: np.ndarray, candidates: np.ndarray) -> 
 
 @dataclass(frozen=True)
 class SurfaceCells:
-    """Of all cells of a mesh: `corners` (c, 4, dim), the last one repeated, and `area` (c,).
+    """The cells that values (k,) belong to: `corners` (k, 4, dim), the last repeated; `area` (k,).
 
     NaN for cells that are no faces in the dimension of the case.
     """
@@ -60,11 +60,9 @@ class SurfaceCells:
 
     @classmethod
     def of(
-        cls, mesh: meshio.Mesh | None, points: np.ndarray | None, axisymmetric: bool
-    ) -> SurfaceCells | None:
-        """The cells of a mesh on `points` (n, dim); None without a mesh that fills the case."""
-        if mesh is None or points is None:
-            return None
+        cls, mesh: meshio.Mesh, points: np.ndarray, cells: np.ndarray, axisymmetric: bool
+    ) -> SurfaceCells:
+        """Those of numbers (k,) in a mesh on `points` (n, dim)."""
         dim = points.shape[1]
         corners, area = [], []
         for block in mesh.cells:
@@ -76,25 +74,26 @@ class SurfaceCells:
                 faces = [(kind.name, block.data, np.arange(count))]
                 at = surface_points(points, faces, axisymmetric)
                 area[-1] = np.bincount(at.macro, at.weight, minlength=count)
-        return cls(np.concatenate(corners), np.concatenate(area))
+        return cls(np.concatenate(corners)[cells], np.concatenate(area)[cells])
 
-    def on(self, cells: np.ndarray, is_on: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Which of the cells (k,) have all of their corners on a surface: `is_on` by place."""
-        corners = self.corners[cells]
-        found = np.isfinite(self.area[cells])
-        for i in range(corners.shape[1]):
-            found[found] = is_on(corners[found, i])
+    def at(self, chosen: np.ndarray) -> SurfaceCells:
+        """The chosen ones, by mask or number."""
+        return SurfaceCells(self.corners[chosen], self.area[chosen])
+
+    def on(self, is_on: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Which of them (k,) have all of their corners on a surface: `is_on` by place."""
+        found = np.isfinite(self.area)
+        corners = self.corners[found]
+        places = corners.reshape(-1, corners.shape[2])
+        found[found] = is_on(places).reshape(corners.shape[:2]).all(axis=1)
         return found
 
-    def means(
-        self, cells: np.ndarray, values: np.ndarray, face: np.ndarray, area: np.ndarray
-    ) -> np.ndarray | None:
+    def means(self, values: np.ndarray, face: np.ndarray, area: np.ndarray) -> np.ndarray | None:
         """The means (m,) of values (k,) over faces of an `area` (m,); None where cells leave a gap.
 
         `face` (k,): the face that each cell is part of.
         """
-        weight = self.area[cells]
-        filled = np.bincount(face, weight, minlength=len(area))
+        filled = np.bincount(face, self.area, minlength=len(area))
         if (np.abs(filled - area) > _FILLED * area).any():
             return None
-        return np.bincount(face, weight * values, minlength=len(area)) / filled
+        return np.bincount(face, self.area * values, minlength=len(area)) / filled

@@ -70,9 +70,10 @@ class Frames:
     ) -> "Frames":
         """With the rigid motion that best brings places `now` (n, dim) of a body to `then`.
 
-        By least squares, each place with its `share` (n,). `around_axis`: only along y.
+        By least squares, each place with its `share` (n,), or all alike where none has one.
+        `around_axis`: only along y.
         """
-        share = np.ones(len(now)) if share is None else share
+        share = share if share is not None and share.any() else np.ones(len(now))
         middle, goal = (share @ each / share.sum() for each in (now, then))
         turn = np.eye(now.shape[1])
         if around_axis:
@@ -326,9 +327,8 @@ def settled(groups: Moved, displacement: np.ndarray, held: np.ndarray) -> Frames
         np.add.at(weight, faces.nodes, 1.0)
     for number in np.flatnonzero(~held).tolist():
         mine = body == number
-        share = weight[mine] if weight[mine].any() else np.ones(mine.sum())
         now, then = points[mine], points[mine] + displacement[mine]
-        frames = frames.following(number, now, then, share, groups.axisymmetric)
+        frames = frames.following(number, now, then, weight[mine], groups.axisymmetric)
     return frames
 
 
