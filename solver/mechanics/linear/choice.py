@@ -91,9 +91,9 @@ class Solvers:
     on a matrix before; it is then not tried again.
     """
 
-    def __init__(self, unknowns: Unknowns | None = None):
+    def __init__(self, unknowns: Unknowns | None = None, gave_up: str = ""):
         """`unknowns` are those of the stiffness."""
-        self.unknowns, self.gave_up = unknowns, ""
+        self.unknowns, self.gave_up = unknowns, gave_up
         self._shared: Shared | None = None
 
     def prepare(self, matrix: Symmetric) -> LinearSolver:

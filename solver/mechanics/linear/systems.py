@@ -247,31 +247,35 @@ class Systems:
     def forget(self) -> None:
         """Keep no factor."""
         for number in list(self._kept):
-            self._drop(number)
+            self._drop(number, self._solvers)
             self._solvers[number].forget()
 
-    def _drop(self, number: int) -> None:
-        """Drop a part's system, and remember why multigrid failed on it, if it did."""
+    def _drop(self, number: int, solvers: Sequence[Solvers]) -> None:
+        """Drop a part's system; its solvers remember why multigrid failed on it, if it did."""
         self.latest, factor = None, self._kept.pop(number)[1].factor
         if factor.gave_up:
-            self._solvers[number].gave_up = factor.gave_up
+            solvers[number].gave_up = factor.gave_up
 
     def closed(self, closed: np.ndarray) -> ConstrainedSystem:
         """The system with the multipliers `closed` (k,); raises SolveError where it is singular."""
+        return self._closed(closed, self._solvers)
+
+    def _closed(self, closed: np.ndarray, solvers: Sequence[Solvers]) -> ConstrainedSystem:
+        """The same, with the solvers of each part for what is not kept."""
         for number, part in enumerate(self._parts):
             mine = closed & part.multipliers
             if number in self._kept and self._kept[number][0] != mine.tobytes():
-                self._drop(number)  # releases its memory first
+                self._drop(number, solvers)  # releases its memory first
             if number in self._kept:
                 continue
-            (matrix, constraints, own), solvers = self._of(part, mine), self._solvers[number]
+            (matrix, constraints, own), by = self._of(part, mine), solvers[number]
             system: ConstrainedSystem
             if own is None:
-                system = augment(matrix, constraints, solvers)
+                system = augment(matrix, constraints, by)
             elif self._compliance and len((soft := self._compliance(mine)).weight):
-                system = stabilise(matrix, constraints, own, soft, solvers)
+                system = stabilise(matrix, constraints, own, soft, by)
             else:
-                system = condense(matrix, constraints, own, solvers)
+                system = condense(matrix, constraints, own, by)
             self._kept[number] = mine.tobytes(), system
         self.latest = self._kept[0][1] if len(self._parts) == 1 else self._together(closed)
         return self.latest
@@ -311,13 +315,6 @@ class Systems:
         if self._matrix.shape[0] < _LARGEST:
             for number, (_, system) in list(self._kept.items()):
                 if system.factor.iterative:
-                    self._drop(number)
-            before = [solvers.gave_up for solvers in self._solvers]
-            for solvers in self._solvers:
-                solvers.gave_up = _MANY
-            try:
-                return self.closed(closed)
-            finally:
-                for solvers, reason in zip(self._solvers, before, strict=True):
-                    solvers.gave_up = reason
+                    self._drop(number, self._solvers)
+            return self._closed(closed, [Solvers(of.unknowns, _MANY) for of in self._solvers])
         return self.closed(closed)

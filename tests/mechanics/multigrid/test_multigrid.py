@@ -297,9 +297,7 @@ def test_a_factor_takes_over_where_multigrid_does_not_converge(options):
         np.testing.assert_allclose(chosen.solve(matrix @ exact), exact, rtol=1e-6)
         assert "multigrid" not in chosen.name
         assert "conjugate gradients leave a residual" in chosen.why
-        solvers = Solvers(unknowns)
-        solvers.gave_up = chosen.gave_up
-        again = solvers.prepare(matrix)
+        again = Solvers(unknowns, chosen.gave_up).prepare(matrix)
         assert (again.name, again.why) == (chosen.name, chosen.why)
 
 
