@@ -227,6 +227,16 @@ class Support(Section, frozen=True):
         if isinstance(fixed, tuple):
             force_setattr(self, "fix", dict.fromkeys(fixed, 0.0))
 
+    @property
+    def components(self) -> dict[str, Any]:
+        """Its values by component: displacements, or stiffnesses."""
+        return {**self.fix, **self.spring}
+
+    @property
+    def by_area(self) -> bool:
+        """Whether the faces of a group share it by their areas."""
+        return bool(self.spring)
+
 
 LOAD_KINDS = ("pressure", "traction", "body_force", "force", "strain", "temperature")
 

@@ -369,7 +369,7 @@ def _placed(case: Case) -> Iterable[tuple[str, Sequence[Scalar]]]:
 
 def _expressions(case: Case) -> Iterable[Expression]:
     """Every expression of the case."""
-    values: list[Any] = [{**support.fix, **support.spring} for support in case.supports]
+    values: list[Any] = [support.components for support in case.supports]
     values += [load.value for load in case.loads]
     values += case.reference.values.values()
     values += [zone.clearance for zone in case.zones]

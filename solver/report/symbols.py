@@ -182,7 +182,7 @@ def body_label(solution: Solution, number: int, at: np.ndarray) -> Label:
 
 def _held(support: Support, normal: np.ndarray) -> Iterator[np.ndarray]:
     """The directions that a support holds or springs resist, turned out of the body."""
-    for name in dict.fromkeys([*support.fix, *support.spring]):
+    for name in support.components:
         axis = normal if name == "normal" else np.eye(3)["xyz".index(name)]
         yield axis if axis @ normal > 0.3 else -axis
 

@@ -14,6 +14,7 @@ from solver.lac.errors import SolveError
 from solver.mesh import generate
 from solver.simulation.motion import _joined, _position
 from solver.simulation.options import LEAN
+from solver.simulation.scene.parts.springs import springs_of
 from solver.simulation.simulate import simulate, solved
 from solver.system.errors import InputError
 from solver.system.progress import Clock
@@ -364,8 +365,8 @@ FAULTS = {
         test_pressure_turns_with_its_face_and_traction_does_not,
     ),
     "springs are drawn from where bodies are": (
-        "solver.simulation.scene.moved.Moved.springs",
-        property(lambda moved: moved.rest.springs),
+        "solver.simulation.scene.parts.springs.springs_of",
+        lambda groups: springs_of(groups.at_rest),
         test_springs_pull_back_from_where_they_were_made,
     ),
     "slip is counted from the start in each step": (

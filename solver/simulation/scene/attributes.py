@@ -34,7 +34,6 @@ from .holdings.holding import Holding
 
 if TYPE_CHECKING:
     from ...mechanics.mortar.quadric import Quadric
-    from .parts.springs import Springs
 
 
 class Attributes(CutGroups):
@@ -100,12 +99,15 @@ class Attributes(CutGroups):
                 values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
         return found
 
-    @cached_property
-    def springs(self) -> Springs:
-        """The springs to the ground and elastic foundations."""
-        from .parts.springs import springs_of
+    @property
+    def at_rest(self) -> Attributes:
+        """Those of the mesh as given."""
+        return self
 
-        return springs_of(self)
+    @property
+    def motion(self) -> np.ndarray:
+        """The displacement (n, dim) of the mesh from where it was given."""
+        return np.zeros_like(self.points)
 
     def surface(self, name: str) -> Quadric | None:
         """The surface of a body, where it is a rigid one that the case gives."""

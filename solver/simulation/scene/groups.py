@@ -226,17 +226,17 @@ class _Groups:
     def check_supports(self) -> None:
         for i, support in enumerate(self.case.supports):
             key = f"supports[{i}].group"
-            if support.spring and support.group != ALL and not self.of_nodes(key, support.group):
+            if support.by_area and support.group != ALL and not self.of_nodes(key, support.group):
                 self.cells(key, support.group, self.dim - 1)
             if support.group == ALL:
-                if "normal" in {*support.fix, *support.spring}:
+                if "normal" in support.components:
                     allowed = "normal needs a group of faces; `all` is held along x, y and z"
                     raise self.error(key, ALL, allowed)
                 continue
             self.require(key, support.group)
             if support.cyclic:
                 self.require(f"supports[{i}].cyclic.of", support.cyclic.of)
-            if "normal" in {*support.fix, *support.spring}:
+            if "normal" in support.components:
                 self.cells(key, support.group, self.dim - 1)
             cells = self.mesh.cell_sets.get(support.group, [])
             if not sum(map(len, [*cells, self.mesh.point_sets.get(support.group, [])])):

@@ -20,7 +20,6 @@ from ...mechanics.fem.supports import Fixed, FreeMotion
 from ...mechanics.mortar.quadric import Quadric
 from .attributes import Attributes
 from .holdings.holding import Holding
-from .parts.springs import Springs
 
 # Imposed displacements are followed until a frame moves by less than this share of its body.
 _FOLLOWED, _ITERATIONS = 1e-13, 50
@@ -100,6 +99,11 @@ class Moved(Attributes):
         self.rest, self.step, self.frames_of_bodies = rest, step, frames
         self.contact_faces, self._wanted = faces, wanted
 
+    @property
+    def at_rest(self) -> Attributes:
+        """Those of the mesh as given."""
+        return self.rest
+
     @cached_property
     def motion(self) -> np.ndarray:
         """The displacement (n, dim) of the frames."""
@@ -150,13 +154,6 @@ class Moved(Attributes):
     def histories(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """All that acts in the step, under a name that no step has."""
         return {"": (self.forces(), self.supports().offset)}
-
-    @cached_property
-    def springs(self) -> Springs:
-        """Those of the mesh as given, drawn by the motion."""
-        stiffness = self.rest.springs.stiffness
-        assert stiffness is not None
-        return Springs(stiffness, self.motion)
 
     def surface(self, name: str) -> Quadric | None:
         """A rigid surface where its body is now."""

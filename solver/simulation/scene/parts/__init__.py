@@ -31,7 +31,9 @@ def parts_of(
     """
     case, parts, strain = groups.case, list[ModelPart](), None
     if any(support.spring for support in case.supports):
-        parts.append(groups.springs)
+        from .springs import springs_of
+
+        parts.append(springs_of(groups))
     if any(load.strains for load in case.loads):
         from .strain import StrainFields
 

@@ -1,6 +1,8 @@
-"""Springs to the ground and elastic foundations."""
+"""Springs to the ground and elastic foundations, made where the mesh was given."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -9,9 +11,11 @@ from ....case.acting import Scalar
 from ....mechanics.fem.displacement import Displacement
 from ....mechanics.fem.loads import Field, at_nodes, foundation
 from ....system.errors import InputError
-from ..cut_groups import CutGroups
 from ..groups import ALL
 from .part import ModelPart, Term
+
+if TYPE_CHECKING:
+    from ..attributes import Attributes
 
 
 class _SpringTerm(Term):
@@ -35,19 +39,20 @@ class Springs(ModelPart):
         return _SpringTerm((self.stiffness @ drawn).reshape(self._drawn.shape))
 
 
-def springs_of(groups: CutGroups) -> Springs:
+def springs_of(groups: Attributes) -> Springs:
     """The springs and foundations of a case; InputError where one has no positive stiffness."""
+    drawn, groups = groups.motion, groups.at_rest
     total = sparse.csr_matrix((groups.points.size, groups.points.size))
     for i, support in enumerate(groups.case.supports):
         for direction, value in support.spring.items():
             total = total + _spring(
                 groups, support.group, direction, value, f"supports[{i}].spring.{direction}"
             )
-    return Springs(total, np.zeros_like(groups.points))
+    return Springs(total, drawn)
 
 
 def _spring(
-    groups: CutGroups, group: str, direction: str, value: Scalar, key: str
+    groups: Attributes, group: str, direction: str, value: Scalar, key: str
 ) -> sparse.csr_matrix:
     points, axis, stiffness = groups.points, "xyz".find(direction), _stiffness(groups, value, key)
     if group == ALL or group in groups.mesh.point_sets:
@@ -60,7 +65,7 @@ def _spring(
     )
 
 
-def _stiffness(groups: CutGroups, value: Scalar, key: str) -> Field:
+def _stiffness(groups: Attributes, value: Scalar, key: str) -> Field:
     """A stiffness as a field; refused where it is not positive."""
     field = groups.field(value)
 
