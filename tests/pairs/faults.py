@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.mechanics.linear import systems
-from solver.mechanics.linear.stabilised import Compliance
+from solver.mechanics.linear.compliant import Compliance
 from solver.mechanics.mortar.coulomb import CoulombContact
 from solver.simulation.equilibrium import problem
 from solver.simulation.judgement import validity

@@ -35,7 +35,7 @@ class CondensedMatrix:
 
     Unknowns that were eliminated add a little near the interface. The rest would be a second copy
     of the stiffness, which the next contact status needs as it is. The last s unknowns are extra
-    ones, which the stiffness does not know: those of stabilised contact.
+    ones, which the stiffness does not know: those of compliant constraints.
     """
 
     def __init__(self, stiffness: csr_matrix | NodalMatrix, kept: np.ndarray, added: csr_matrix):

@@ -10,7 +10,7 @@ positive definite, and the multipliers follow from A by few steps p ← p + w (b
 Fortin, Glowinski, Augmented Lagrangian methods, North-Holland 1983, ch. 1; Golub, Greif, On solving
 block-structured indefinite linear systems, SIAM J. Sci. Comput. 24 (2003) 2076–2092.
 
-Stabilised: constraints give way to pressures that scatter (`linear.stabilised`).
+Compliant: constraints give way to their pressures (`linear.compliant`).
 """
 
 from collections.abc import Callable, Sequence
@@ -22,11 +22,11 @@ from scipy import sparse
 from ...lac.errors import SolveError
 from ..fem.bodies import joined_bodies
 from .choice import Solvers
+from .compliant import Compliance, condense_compliant
 from .condensation import ConstrainedSystem, condense
 from .condensed_matrix import CondensedMatrix, Symmetric
 from .factor import Factor, factorise
 from .krylov import EPSILON
-from .stabilised import Compliance, stabilise
 from .symmetric_blocks import Stiffness
 from .unknowns import Unknowns
 
@@ -224,7 +224,7 @@ class Systems:
     `matrix` K (n, n), `constraints` (k, n) of all multipliers, `own` (n,) the unknowns that may be
     eliminated by condensation, None where some multiplier has none: then the constraints augment
     the stiffness. `unknowns` describes each. `compliance`: of the c multipliers that a mask (k,)
-    has closed, where contact is stabilised.
+    has closed, where they give way.
     """
 
     def __init__(
@@ -273,7 +273,7 @@ class Systems:
             if own is None:
                 system = augment(matrix, constraints, by)
             elif self._compliance and len((soft := self._compliance(mine)).weight):
-                system = stabilise(matrix, constraints, own, soft, by)
+                system = condense_compliant(matrix, constraints, own, soft, by)
             else:
                 system = condense(matrix, constraints, own, by)
             self._kept[number] = mine.tobytes(), system

@@ -6,7 +6,7 @@ from scipy import sparse
 
 from solver.lac.errors import SolveError
 from solver.mechanics.linear.choice import Solvers
-from solver.mechanics.linear.stabilised import Compliance, StabilisedSystem, stabilise
+from solver.mechanics.linear.compliant import Compliance, CompliantSystem, condense_compliant
 from solver.mechanics.linear.systems import Part, Systems, augment
 from solver.mechanics.multigrid import multigrid
 from solver.mechanics.multigrid.hierarchy import Interface, Level
@@ -174,7 +174,7 @@ def solved(matrix, gaps, compliance: Compliance, force, violation):
 
 def test_one_spring():
     """2 x = f + p with x + s p = b: for f = 0, b = 3, s = 1/4, p = 3 / (1/2 + 1/4) = 4, x = 2."""
-    system = stabilise(K, G, OWN, SPRING)
+    system = condense_compliant(K, G, OWN, SPRING)
     x = system.correction(np.zeros(2), np.array([3.0]))
     assert x == pytest.approx([2.0, 0.0])
     left = -K @ x
@@ -185,26 +185,26 @@ def test_one_spring():
 
 def test_gaps_that_do_not_fit_the_pressure_are_an_imbalance():
     """p = 4 opens by s p = 1. A gap of 1.5 is 0.5 too large: 0.5 / (1/4 + 1/2), by both."""
-    system = stabilise(sparse.csr_matrix([[2.0, -1.0], [-1.0, 1.0]]), G, OWN, SPRING)
+    system = condense_compliant(sparse.csr_matrix([[2.0, -1.0], [-1.0, 1.0]]), G, OWN, SPRING)
     assert system.imbalance(np.array([-4.0, 0.0]), np.array([1.5])) == pytest.approx(2 / 3)
 
 
 def test_what_soft_springs_leave_is_the_rounding_of_a_pressure():
     """A body 10⁹ times as stiff as the spring: a gap of 10⁻¹² is 4·10⁻¹² of pressure, not 10⁻³."""
     stiff = sparse.csr_matrix([[1e9, 0.0], [0.0, 1e9]])
-    system = stabilise(stiff, G, OWN, SPRING)
+    system = condense_compliant(stiff, G, OWN, SPRING)
     left = system.imbalance(np.array([-4.0, 0.0]), np.array([1.0 + 1e-12]))
     assert left == pytest.approx(4e-12, rel=1e-3)
 
 
 def test_without_compliance_the_constraint_holds():
-    system = stabilise(K, G, OWN, Compliance(sparse.csr_matrix((0, 1)), np.empty(0)))
+    system = condense_compliant(K, G, OWN, Compliance(sparse.csr_matrix((0, 1)), np.empty(0)))
     assert system.correction(np.array([1.0, 1.0]), np.array([3.0])) == pytest.approx([3.0, 1.0])
 
 
 def test_a_constraint_without_an_unknown_of_its_own():
     with pytest.raises(SolveError, match="1 closed macro-elements have no unknown of their own"):
-        stabilise(K, G, np.array([False, True]), SPRING)
+        condense_compliant(K, G, np.array([False, True]), SPRING)
 
 
 def system_of(slave: int, master: int, stiffness: float, kind: str) -> tuple:
@@ -212,11 +212,11 @@ def system_of(slave: int, master: int, stiffness: float, kind: str) -> tuple:
     matrix, gaps, own, unknowns = pressed(slave, master)
     compliance = neighbours(slave, stiffness)
     with force_solver(kind):
-        system = stabilise(matrix, gaps, own, compliance, Solvers(unknowns))
+        system = condense_compliant(matrix, gaps, own, compliance, Solvers(unknowns))
     return system, matrix, gaps, compliance
 
 
-def assert_solves(system: StabilisedSystem, matrix, gaps, compliance) -> None:
+def assert_solves(system: CompliantSystem, matrix, gaps, compliance) -> None:
     rng = np.random.default_rng(0)
     force, violation = rng.standard_normal(matrix.shape[0]), rng.standard_normal(gaps.shape[0])
     exact, pressure = solved(matrix, gaps, compliance, force, violation)

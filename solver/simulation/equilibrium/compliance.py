@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from ...mechanics.linear.stabilised import Compliance
+from ...mechanics.linear.compliant import Compliance
 from ..scene.scene import Scene
 
 

@@ -1,4 +1,4 @@
-"""Systems whose constraints give way to pressures that scatter.
+"""Systems whose constraints give way to their pressures.
 
 K x = f + Gᵀ p, G x + S p = b with a compliance S = Lᵀ D L of the constraints. With s unknowns
 r = D L p more, those of springs of the stiffness D⁻¹, these are the constraints [G Lᵀ] (x, r) = b
@@ -28,7 +28,7 @@ class Compliance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StabilisedSystem(ConstrainedSystem):
+class CompliantSystem(ConstrainedSystem):
     """The system `condensed` of displacement and springs (n + s,), for a displacement (n,).
 
     The springs are the ones of the pressures that balance the forces. See `ConstrainedSystem`.
@@ -79,17 +79,17 @@ class StabilisedSystem(ConstrainedSystem):
         return np.concatenate([force, -stretch]), violation - self.compliance.scatter.T @ moved
 
 
-def stabilise(
+def condense_compliant(
     matrix: Stiffness,
     constraints: sparse.csr_matrix,
     own: np.ndarray,
     compliance: Compliance,
     solvers: Solvers | None = None,
-) -> StabilisedSystem:
+) -> CompliantSystem:
     """Condense K (n, n) and its springs by G (m, n) and the `compliance`; see `condense`.
 
     Raises SolveError where a constraint has no unknown of its own, or the system is singular.
     """
     whole = sparse.hstack([constraints, compliance.scatter.T], format="csr")
     condensed = condense(matrix, whole, own, solvers, extra=1 / compliance.weight)
-    return StabilisedSystem(factor=condensed.factor, condensed=condensed, compliance=compliance)
+    return CompliantSystem(factor=condensed.factor, condensed=condensed, compliance=compliance)
