@@ -31,7 +31,7 @@ from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError
 from ..system.files import write_text
-from . import friction, numbers, samples
+from . import friction, hooke, numbers, samples
 from .inputs import accepted_file
 from .verdict import CheckResult, Regression, extremes
 
@@ -150,7 +150,7 @@ def run_checks(
 
 def sampler_of(check: Check) -> samples.Sampler:
     """The function that gives the values of a check."""
-    rooms = (samples, numbers, friction)
+    rooms = (samples, numbers, friction, hooke)
     found: Any = next(getattr(r, check.sample) for r in rooms if hasattr(r, check.sample))
     sampler: samples.Sampler = found(check.of) if check.of else found
     return sampler

@@ -43,15 +43,13 @@ import numpy as np
 from ..case.solutions.base import ElasticSolution, ExactSolution, lame_of
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import SlaveFaces, surface_points
-from ..lac.cells.shape import gauss_rule, shape_functions
+from ..lac.cells.shape import gauss_rule
 from ..lac.threads import prefetch
-from ..mechanics.fem.elasticity import shapes_in
 from ..mechanics.fem.faces import pieces
 from ..simulation.results.exact import ExactValues, computed_pressure
 from ..simulation.results.solution import NodalContact, Solution, ZoneResult
+from .in_cells import deformable_parts, in_cells
 
-# Numbers of gradients handled at once.
-_CHUNK = 1 << 19
 # Off-diagonal components count twice in a square.
 _WHOLE = np.sqrt([1, 1, 1, 2, 2, 2])
 
@@ -87,13 +85,11 @@ def _field_errors(solution: Solution, exact: ElasticSolution) -> dict[str, float
 
 def _squares(solution: Solution, exact: ElasticSolution) -> Iterator[np.ndarray]:
     """By chunk of cells (3, 2): ∫ of squares of error and exact value, for u, ∇u, σ."""
-    part, moving = ExactValues(solution, exact).part, solution.deformable
+    part = ExactValues(solution, exact).part
     for block in solution.mesh.cells:
         kind = cell_type(block.type)
         rule = gauss_rule(kind.name, kind.order + 2)
-        chosen = np.flatnonzero(moving[block.data].all(axis=1))
-        step = max(1, _CHUNK // (len(rule[1]) * kind.n_nodes * kind.dim))
-        chunks = [chosen[start : start + step] for start in range(0, len(chosen), step)]
+        chunks = deformable_parts(solution, block, len(rule[1]))
         yield from prefetch(partial(_squares_in, solution, exact, part, block, rule), chunks)
 
 
@@ -106,27 +102,22 @@ def _squares_in(
     chosen: np.ndarray,
 ) -> np.ndarray:
     """The integrals over the `chosen` cells of a block, with the `parts` (n_points,) of nodes."""
-    points, kind, (reference, weights) = solution.mesh.points, cell_type(block.type), rule
-    values = shape_functions(kind.name).values(reference)
-    cells, mixed = block.data[chosen], solution.fields.mean_stress.get(kind.name)
-    part, place = parts[cells[:, 0]], (values @ points[cells]).reshape(-1, kind.dim)
-    at = np.repeat(part, len(weights))
+    found, weights = in_cells(solution, block, chosen, rule[0]), rule[1]
+    place = found.place.reshape(-1, found.place.shape[-1])
+    at = np.repeat(parts[block.data[chosen, 0]], len(weights))
     u, gradient = exact.displacement(place, at), exact.gradient(place, at)
-    shapes = shapes_in(points, kind, cells, reference, solution.case.axisymmetric)
-    nodal = solution.displacement[cells]
-    slope = shapes.slopes(nodal - nodal[:, :1], nodal[..., 0])
-    error = slope.reshape(gradient.shape) - gradient
+    error = found.slope.reshape(gradient.shape) - gradient
     stress = exact.hooke(error, at)
-    if mixed is not None:  # there the mean stress stands for λ div u
+    if found.mean is not None:
         lame = np.array([lame_of(material)[0] for material in exact.materials])[at]
-        mean = (mixed[chosen] @ values.T).ravel()
-        stress[:, :3] += np.nan_to_num(mean - lame * np.einsum("nii->n", error + gradient))[:, None]
+        mean = found.mean.ravel() - lame * np.einsum("nii->n", error + gradient)
+        stress[:, :3] += np.nan_to_num(mean)[:, None]
     pairs = (
-        ((values @ nodal).reshape(place.shape) - u, u),
+        (found.displacement.reshape(place.shape) - u, u),
         (error, gradient),
         (stress * _WHOLE, exact.hooke(gradient, at) * _WHOLE),
     )
-    weight = (shapes.measure * weights).ravel()
+    weight = (found.shapes.measure * weights).ravel()
     return np.array([[_integral(weight, each) for each in pair] for pair in pairs])
 
 

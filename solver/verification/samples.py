@@ -7,37 +7,22 @@ whole solve) and the reference; it returns None if there is nothing to compare.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..case.expressions import evaluate
-from ..lac.cells.catalogue import cell_type
-from ..lac.cells.shape import shape_functions
-from ..lac.threads import prefetch
-from ..mechanics.fem.block import volume_rule
-from ..mechanics.fem.elasticity import (
-    hoop_values,
-    lame_parameters,
-    physical_gradients,
-    with_hoop,
-)
 from ..mechanics.fem.stress import COMPONENTS
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
-from ..simulation.scene.groups import ALL
-from ..simulation.scene.parts.strain import strain_at
 from ..system.errors import InputError, hint
 from .coverage import expected_coverage
 
 Reference = Any
 # Pressures and gaps below this share of load and length are zero.
 _TOUCHING = 1e-12
-# Numbers of gradients handled at once: small enough to stay in the processor's cache.
-_CHUNK = 1 << 17
 
 
 @dataclass(frozen=True)
@@ -196,116 +181,6 @@ def stress_components(solution: Solution, _: None, reference: Reference) -> Samp
     return by_component(
         values, points, COMPONENTS, reference, lambda: reference.stress(nodes), _at_nodes(nodes)
     )
-
-
-def integration_stress(solution: Solution, _: None, reference: Reference) -> Sample:
-    """The given components at the integration points of all cells, by Hooke's law.
-
-    They follow from the displacement, less initial strains, without extrapolation to nodes and
-    averages. The sample has what decides a check: of each chunk of cells the extreme values, and
-    the largest reference and deviation.
-    """
-    names = COMPONENTS if isinstance(reference, ExactValues) else tuple(reference)
-
-    def decisive(chunk: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
-        place, stress, node, cell = chunk
-        if isinstance(reference, ExactValues):
-            expected = reference.exact.stress(place, reference.part[node]).T
-        else:
-            expected = np.stack([evaluate(reference[name], place) for name in names])
-        found: list[tuple[np.ndarray, ...]] = []
-        for name, wanted in zip(names, expected, strict=True):
-            values = stress[:, COMPONENTS.index(name)]
-            worst = np.abs(values - wanted).argmax(), np.abs(wanted).argmax()
-            kept = np.unique([values.argmin(), values.argmax(), *worst])
-            found.append((values[kept], wanted[kept], cell[kept]))
-        return found
-
-    by_name = zip(*map(decisive, _by_hooke(solution)), strict=True)
-    listed = [
-        (name, *found) for name, chunks in zip(names, by_name, strict=True) for found in chunks
-    ]
-    places = [(cell, name) for name, _, _, cells in listed for cell in cells]
-    return Sample(
-        np.concatenate([values for _, values, _, _ in listed]),
-        np.concatenate([expected for _, _, expected, _ in listed]),
-        lambda i: "cell {} ({})".format(*places[i]),
-    )
-
-
-def _by_hooke(solution: Solution) -> Iterator[tuple[np.ndarray, ...]]:
-    """By chunk of deformable cells, at their k integration points in all: place, stress, owner.
-
-    Place (k, dim), stress (k, 6), and of the cell: its first node (k,) and its number (k,).
-    """
-    moving, first = solution.deformable, 0
-    for i, (block, elastic) in enumerate(
-        zip(solution.mesh.cells, _materials(solution), strict=True)
-    ):
-        kind = cell_type(block.type)
-        chosen = np.flatnonzero(moving[block.data].all(axis=1))
-        step = max(1, _CHUNK // (len(volume_rule(kind.name)[1]) * kind.n_nodes * kind.dim))
-        parts = [chosen[start : start + step] for start in range(0, len(chosen), step)]
-        yield from prefetch(partial(_hooke_in, solution, i, elastic, first), parts)
-        first += len(block.data)
-
-
-def _hooke_in(
-    solution: Solution, block: int, elastic: np.ndarray, first: int, part: np.ndarray
-) -> tuple[np.ndarray, ...]:
-    """See `_by_hooke`: a part of the cells of a block, its first cell numbered `first`."""
-    points, kind = solution.mesh.points, cell_type(solution.mesh.cells[block].type)
-    reference, _ = volume_rule(kind.name)
-    values = shape_functions(kind.name).values(reference)
-    cells = solution.mesh.cells[block].data[part]
-    gradient, _ = physical_gradients(points, cells, kind, reference)
-    nodal = solution.displacement[cells]
-    slope = np.swapaxes(nodal - nodal[:, :1], 1, 2)[:, None] @ gradient
-    if solution.case.axisymmetric:
-        hoop, _ = hoop_values(points, cells, kind, reference)
-        slope = with_hoop(slope, (hoop @ nodal[:, :, :1])[..., 0])
-    dim, place = slope.shape[-1], (values @ points[cells]).reshape(-1, kind.dim)
-    lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
-    initial = np.zeros((*slope.shape[:2], 6))
-    if any(load.strains for load in solution.case.loads):
-        initial = _initial_strain(solution, block, part, place).reshape(initial.shape)
-    mean = lame * (np.einsum("cqii->cq", slope) - initial[..., :3].sum(axis=-1))
-    if (mixed := solution.fields.mean_stress.get(kind.name)) is not None:
-        own = mixed[part] @ values.T
-        mean = np.where(np.isnan(own), mean, own)
-    tensor = np.zeros((*mean.shape, 3, 3))
-    tensor[..., :dim, :dim] = slope + np.swapaxes(slope, 2, 3)
-    tensor = shear[..., None, None] * tensor + mean[..., None, None] * np.eye(3)
-    if solution.case.thin:
-        tensor[..., 2, 2] = 0.0
-    stress = tensor[..., [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
-    stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
-    return place, stress, *(np.repeat(each, len(reference)) for each in (cells[:, 0], first + part))
-
-
-def _initial_strain(
-    solution: Solution, block: int, part: np.ndarray, place: np.ndarray
-) -> np.ndarray:
-    """The initial strain (k, 6) in the last step at points (k, dim) in cells (n,) of a block."""
-    case, found = solution.case, np.zeros((len(place), 6))
-    for load in (load for load in case.loads if load.strains):
-        here = np.ones(len(place), dtype=bool)
-        if load.group != ALL:
-            mine = np.isin(part, solution.mesh.cell_sets[load.group][block])
-            here = np.repeat(mine, len(place) // len(part))
-        found[here] += load.factor(case.steps[-1]) * strain_at(case, load, place[here])
-    return found
-
-
-def _materials(solution: Solution) -> list[np.ndarray]:
-    """Young's modulus and Poisson's ratio (n, 2) of the cells of each block."""
-    given = solution.case.materials
-    start = [(given[ALL].young, given[ALL].poisson)] if ALL in given else [(1.0, 0.0)]
-    found = [np.repeat(start, len(block.data), axis=0) for block in solution.mesh.cells]
-    for group in given.keys() - {ALL}:
-        for values, members in zip(found, solution.mesh.cell_sets[group], strict=True):
-            values[np.asarray(members, dtype=int)] = given[group].young, given[group].poisson
-    return found
 
 
 def norm(name: str) -> Sampler:

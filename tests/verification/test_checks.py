@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import solver.lac.threads
-import solver.verification.samples
+import solver.verification.in_cells
 from solver.case.checks import CHECKS, ERRORS
 from solver.verification.checks import SCALES, Accepted, block_size, run_checks, sampler_of
 from tests.handmade import PLANE, plane
@@ -63,7 +63,7 @@ def test_stress_of_cells_in_parts_is_judged_as_in_one(solution, monkeypatch, val
     whole = by_name(solution)["integration_stress"]
     assert not whole.passed
     monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
-    monkeypatch.setattr(solver.verification.samples, "_CHUNK", 1)
+    monkeypatch.setattr(solver.verification.in_cells, "_CHUNK", 1)
     parts = by_name(solution)["integration_stress"]
     assert parts.where == whole.where
     for name in ("minimum", "maximum", "value", "reference", "scale", "error"):

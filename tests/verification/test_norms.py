@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import solver.lac.threads
-import solver.verification.norms
+import solver.verification.in_cells
 from solver.case.material import Material
 from solver.case.rigid import Rigid
 from solver.case.solutions.catalogue import SOLUTIONS
@@ -77,7 +77,7 @@ def test_parts_and_threads_change_no_number(handmade, monkeypatch, threads):
     handmade.displacement *= 1.0 + 0.01 * np.arange(len(handmade.displacement))[:, None]
     whole = errors(handmade)
     monkeypatch.setattr(solver.lac.threads, "workers", lambda: threads)
-    monkeypatch.setattr(solver.verification.norms, "_CHUNK", 1)
+    monkeypatch.setattr(solver.verification.in_cells, "_CHUNK", 1)
     assert whole["stress_l2"] > 0.01
     assert errors(handmade) == pytest.approx(whole, rel=1e-13)
 
