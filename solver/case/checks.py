@@ -98,7 +98,8 @@ CHECKS: tuple[Check, ...] = (
     Check("multiplier", "contact pressure: the multiplier of every macro-element", "pressure",
           "load", alias="LAGS_C", key="contact_pressure"),
     Check("position_pressure",
-          "contact pressure of every covered contact element at all positions before the last one",
+          "contact pressure of every covered contact element at positions under the loads of the "
+          "last one",
           "at_positions", "load", of="pressure", key="contact_pressure", when="moving",
           like="multiplier"),
     Check("nodal_stress", "normal stress at every node of both bodies", "nodal_stress", "load",
@@ -135,8 +136,8 @@ CHECKS: tuple[Check, ...] = (
     Check("friction_traction", "traction of friction on every contact element of the slave",
           "friction", "load", of="friction_traction", key="friction_traction"),
     Check("position_friction",
-          "traction of friction on every covered contact element at all positions before the last "
-          "one",
+          "traction of friction on every covered contact element at positions under the loads of "
+          "the last one, reached the same way",
           "at_positions", "load", of="friction_traction", key="friction_traction", when="moving",
           like="friction_traction"),
     Check("slip", "slip of the master on every contact element, in the last step", "friction",

@@ -8,7 +8,9 @@ from typing import Any
 import meshio
 import numpy as np
 
+from ..case.acting import Step, factor_of
 from ..case.expressions import evaluate
+from ..case.model import Case
 from ..mechanics.fem.stress import COMPONENTS
 from ..simulation.equilibrium.constraints import MIN_COVERAGE
 from ..simulation.results.exact import ExactValues
@@ -97,7 +99,11 @@ def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample |
 
 
 def at_positions(quantity: str) -> Sampler:
-    """Sample a field of contact at all positions before the last one, where it is covered."""
+    """Sample a field of contact at the positions before the last one, where it is covered.
+
+    The reference is that of the last step: positions under other loads are not compared, friction
+    not where the bodies go another way.
+    """
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
         number = [one.name for one in solution.zones].index(zone.name)
@@ -106,6 +112,8 @@ def at_positions(quantity: str) -> Sampler:
         values, expected, where = [], [], []
         count, dim = len(zone.area), solution.mesh.points.shape[1]
         for step, position in enumerate(solution.earlier, start=1):
+            if not _as_in_the_last(solution.case, step, quantity):
+                continue
             covered = position.of_zone("coverage", number, count) > MIN_COVERAGE
             field = sign * position.of_zone(quantity, number, count).reshape(count, -1)
             values.append(field[covered, :dim])
@@ -118,6 +126,36 @@ def at_positions(quantity: str) -> Sampler:
         return Sample(found.T.ravel(), known.T.ravel(), lambda i: where[i % len(where)])
 
     return sample
+
+
+def _as_in_the_last(case: Case, step: int, quantity: str) -> bool:
+    """Whether the loads of the last step act in another one, on whatever groups.
+
+    For friction, whether supports and bodies go the same way too.
+    """
+    here, last = case.steps[step - 1], case.steps[-1]
+    if not isinstance(here, dict) and here != last:
+        return False
+
+    def acting(step: Step) -> list[str]:
+        factors = ((load, load.factor(step)) for load in case.loads)
+        return sorted(repr((load.kind, load.value, factor)) for load, factor in factors if factor)
+
+    if acting(here) != acting(last):
+        return False
+    pressed = quantity == "pressure"
+    return pressed or np.allclose(_way(case, step), _way(case, len(case.steps)))
+
+
+def _way(case: Case, step: int) -> np.ndarray:
+    """The direction in which a step changes the factors of what is no load."""
+    loads = {load.name for load in case.loads}
+    names = [name for name in case.histories if name not in loads] if case.histories else [""]
+    here, before = (
+        [factor_of(n, s) for n in names] for s in (case.steps[step - 1], case.steps[step - 2])
+    )
+    change = np.subtract(here, before if step > 1 else 0.0)
+    return change / (np.abs(change).max(initial=0.0) or 1.0)
 
 
 def _there(

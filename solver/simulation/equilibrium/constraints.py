@@ -199,7 +199,8 @@ def refuse_unsolvable(scene: Scene, moves: str, constraints: ContactConstraints)
     `moves`: the free motion that is left with all of the contact closed; empty if none.
     """
     if moves:
-        allowed = f"{moves}, even with all of the contact closed; add a support"
+        instead = "add a support, or refine the slave where contact should hold it"
+        allowed = f"{moves}, even with all of the contact closed; {instead}"
         raise InputError(scene.case.path, "supports", None, allowed)
     lost = constraints.dependent
     for zone in scene.zones:
