@@ -222,34 +222,56 @@ def counts(solution: Solution, _: None, __: Reference) -> Sample | None:
 
 
 def observed(quantity: str) -> Sampler:
-    """Sample the observations in a zone at every step; pressure grows with the load factor.
+    """Sample the observations in a zone, at the steps whose share of the reference is known.
 
-    The reference is that of the last step; where nothing acts in it, no other step is compared.
+    The reference is that of the last step, an exact solution that of the load factor 1.
     """
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
+        exact = isinstance(reference, ExactValues)
         rows = [
-            (step.factor, o["macro_element"], float(o[quantity]))
-            for step in solution.steps
+            (share, f"macro-element {o['macro_element']}, load factor {step.factor:g}", o)
+            for step, share in zip(solution.steps, _shares(solution, exact), strict=True)
             for o in step.observations
-            if o["zone"] == zone.name
+            if o["zone"] == zone.name and share is not None
         ]
-        last = solution.steps[-1].factor
-        if solution.case.histories or not last:
-            rows = [(1.0, *row[1:]) for row in rows if row[0] == last]
-        elif isinstance(reference, ExactValues):  # of the whole load
-            rows = [row for row in rows if row[0] == 1.0]
         if not rows:
             return None
-        factors, elements, values = (np.array(column) for column in zip(*rows, strict=True))
-        if isinstance(reference, ExactValues):
+        shares, places, seen = zip(*rows, strict=True)
+        elements = [one["macro_element"] for one in seen]
+        if exact:
             expected = getattr(reference, quantity)(zone)[elements]
         else:
-            expected = evaluate(reference, zone.centre[elements])
-            if quantity == "pressure":
-                expected = expected * factors / (1.0 if solution.case.histories else last or 1.0)
-        return Sample(
-            values, expected, lambda i: f"macro-element {elements[i]}, load factor {factors[i]:g}"
-        )
+            expected = evaluate(reference, zone.centre[elements]) * np.array(shares)
+        values = np.array([float(one[quantity]) for one in seen])
+        return Sample(values, expected, lambda i: places[i])
 
     return sample
+
+
+def _shares(solution: Solution, exact: bool) -> list[float | None]:
+    """The pressures and gaps at each step over those in the last one; None where it is unknown.
+
+    All grows with the load factor where surfaces touch from the start and nothing slips back.
+    """
+    case, factors = solution.case, [step.factor for step in solution.steps]
+    last, back = factors[-1], case.frictional and bool((np.diff(factors) < 0).any())
+    if case.histories or not last:
+        return [1.0 if factor == last else None for factor in factors]
+    if exact:
+        return [1.0 if factor == 1 else None for factor in factors]
+    if back:
+        return [*(None for _ in factors[1:]), 1.0]
+    if case.moving or _apart(solution):
+        return [1.0 if factor == last and not case.frictional else None for factor in factors]
+    return [factor / last if factor / last >= 0 else None for factor in factors]
+
+
+def _apart(solution: Solution) -> bool:
+    """Whether surfaces are apart, or overlap, before anything acts."""
+    if any(zone.interference or zone.clearance is not None for zone in solution.case.zones):
+        return True
+    gaps = (zone.meshed_gap for zone in solution.zones if zone.meshed_gap is not None)
+    return (
+        max((np.abs(gap).max() for gap in gaps), default=0.0) > _TOUCHING * solution.scalars.length
+    )

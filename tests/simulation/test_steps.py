@@ -16,7 +16,7 @@ from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
 from solver.verification.run import Job, check, solve
 from tests import scenes
-from tests.scenes import POISSON, YOUNG, block_mesh
+from tests.scenes import POISSON, YOUNG, block_mesh, replaced
 
 CASE = """\
 name: steps
@@ -169,6 +169,51 @@ def test_places_are_observed_against_the_last_factor():
     found = {check.name: check for check in run_checks(solved(text)[0])}
     assert found["observation"].error < 1e-12
     assert found["observation"].maximum == pytest.approx(16.5)
+
+
+PRESSED = """\
+name: steps
+mesh: {recipe: blocks, size: 1.0}
+plane: strain
+materials: {all: {young: 2000.0, poisson: 0.0}}
+supports:
+  - {group: base, fix: [y]}
+  - {group: symx, fix: [x]}
+  - {group: press, fix: {y: -0.02}}
+contact: [{name: zone, slave: bottom_contact, master: top_contact}]
+observe: [{zone: zone, nearest: [0, 0]}]
+steps: [0.5, 1.0]
+reference: {kind: analytical, contact_pressure: 20.0, gap: 0.0}
+"""
+# What changes, the pressure and gap of both steps, and how many of them are compared.
+APART = {
+    "touching": ((), (10.0, 20.0), (0.0, 0.0), 2),
+    "opening": ((("y: -0.02", "y: 0.02"),), (0.0, 0.0), (0.01, 0.02), 2),
+    "interference": (
+        (("top_contact}", "top_contact, interference: 0.02}"),),
+        (30.0, 40.0),
+        (0, 0),
+        1,
+    ),
+    "clearance": ((("top_contact}", "top_contact, clearance: 0.01}"),), (0.0, 10.0), (0, 0), 1),
+    "back": ((("[0.5, 1.0]", "[1.0, 0.5]"),), (20.0, 10.0), (0.0, 0.0), 2),
+    "friction": ((("top_contact}", "top_contact, friction: 0.1}"),), (10.0, 20.0), (0.0, 0.0), 2),
+}
+
+
+@pytest.mark.parametrize("name", APART)
+def test_steps_are_compared_where_their_share_of_the_last_one_is_known(name):
+    """By E u / 2 and the gap that is left; a wrong value is noticed where it is compared."""
+    changes, pressures, gaps, compared = APART[name]
+    values = f"contact_pressure: {pressures[1]}, gap: {gaps[1]}"
+    text = replaced(PRESSED, *changes, ("contact_pressure: 20.0, gap: 0.0", values))
+    solution, found = solved(text)
+    assert found == pytest.approx(pressures, abs=1e-11)
+    assert [s.observations[0]["gap"] for s in solution.steps] == pytest.approx(gaps, abs=1e-14)
+    assert all(check.passed for check in run_checks(solution))
+    solution.steps[0].observations[0]["pressure"] += 1.0
+    failed = [check.name for check in run_checks(solution) if not check.passed]
+    assert failed == ["observation"] * (compared - 1)
 
 
 def test_the_steps_before_one_without_a_solution_are_kept(tmp_path):
