@@ -2,8 +2,8 @@
 
 A check compares values with the reference at their own places: macro-element centres, nodes, or
 load steps. `error` is the largest deviation over the check's scale: the largest magnitude
-of the reference, or, where the reference is zero everywhere, the quantity's own measure (load for
-stresses, load / stiffness × size for displacements; `SCALES`). A gap is always measured against the
+of the reference, or, where the reference is zero everywhere up to rounding, the quantity's own
+measure (load for stresses, load / stiffness × size for displacements; `SCALES`). A gap is always measured against the
 block size, status, coverage and balance against one. A value that is not a number fails.
 
 Accepted values are the last results that a person has reviewed, kept under version control beside
@@ -34,6 +34,9 @@ from ..system.files import write_text
 from . import friction, hooke, numbers, samples
 from .inputs import accepted_file
 from .verdict import CheckResult, Regression, extremes
+
+# A reference below this share of the quantity's own measure is the rounding of one that is zero.
+_ROUNDED = 1e-14
 
 
 def unit(_: Solution) -> float:
@@ -166,8 +169,8 @@ def _judge(
 ) -> CheckResult:
     name = zone.name if zone else None
     magnitude = float(np.abs(sample.reference).max(initial=0.0))
-    measure = SCALES[check.scale]
-    scale = measure(solution) if check.fixed or magnitude == 0 else magnitude
+    measure = SCALES[check.scale](solution)
+    scale = measure if check.fixed or magnitude <= _ROUNDED * measure else magnitude
     deviation = np.abs(sample.values - sample.reference)
     if deviation.size:
         worst = int(np.argmax(deviation))  # the first that is not a number, if any

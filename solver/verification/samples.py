@@ -77,10 +77,14 @@ def gap(_: Solution, zone: ZoneResult, reference: Reference) -> Sample:
 def status(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """Closed where the reference presses.
 
-    Either status is right at the edge of contact, and where surfaces touch without pressure.
+    Either status is right at the edge of contact, where surfaces touch without pressure, and where
+    the reference is one that is zero, rounded.
     """
     found = zone.closed.astype(float)
-    expected = (reference_where_covered(solution, zone, reference) > 0).astype(float)
+    wanted = reference_where_covered(solution, zone, reference)
+    expected = (wanted > 0).astype(float)
+    rounded = (wanted > 0) & (wanted <= _TOUCHING * solution.scalars.load_scale)
+    expected = np.where(rounded, found, expected)
     touching = zone.multiplier <= _TOUCHING * solution.scalars.load_scale
     touching &= zone.gap <= _TOUCHING * solution.scalars.length
     expected = np.where(touching & (expected == 0), found, expected)
