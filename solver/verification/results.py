@@ -102,10 +102,10 @@ def _write(
     given = vars(solution.scalars) | vars(solution.cost) | {"ended": solution.ended}
     scalars = {k: v for k, v in given.items() if v is not None and not isinstance(v, dict)}
     file.create_group("solve").attrs.update(scalars)
-    probes = file.create_group("probes")
+    probes = file.create_group("probes", track_order=True)
     if solution.places.probes:
         write_probes(probes, solution.places.probes)
-    acted = file.create_group("acted")
+    acted = file.create_group("acted", track_order=True)
     for key, nodes in solution.places.acted.items():
         acted[key] = nodes.astype(np.int32)
     file.create_group("accuracy").attrs.update(solution.quality.accuracy)

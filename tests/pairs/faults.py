@@ -19,6 +19,7 @@ from solver.simulation.scene.parts import strain
 from solver.simulation.scene.parts.springs import Springs
 from solver.simulation.scene.parts.strain import StrainFields
 from solver.simulation.scene.scene import Scene
+from solver.verification import numbers, samples
 from tests.pairs.options import plain_in
 
 
@@ -221,5 +222,21 @@ FAULTS = (
         "compliance_of",
         _pressures_among_forces,
         "solid",
+    ),
+    Fault(
+        "steps-across-a-gap",
+        "pressures of all steps are held against a share of the last one's, across a gap too",
+        {"gap": "interference", "steps": "factors"},
+        samples,
+        "_apart",
+        lambda true: lambda solution: False,
+    ),
+    Fault(
+        "positions-under-other-loads",
+        "every position is held against the pressure of the last one",
+        {"motion": "large", "steps": "factors"},
+        numbers,
+        "_as_in_the_last",
+        lambda true: lambda *given: True,
     ),
 )

@@ -13,9 +13,10 @@ from solver.simulation.results.solution import Solution
 from solver.simulation.simulate import solved
 from solver.system.errors import InputError
 from solver.system.progress import Clock
+from solver.verification.checks import run_checks
 from solver.verification.judge import judge
 from solver.verification.results import read_result, write_result
-from solver.verification.verdict import UNRELIABLE
+from solver.verification.verdict import FAILED, UNRELIABLE
 from tests.same import read_back
 
 from .options import Row
@@ -73,9 +74,10 @@ def tried(row: Row) -> Outcome:
 
 def _amiss(solution: Solution) -> str:
     """What the program makes of an exact result: an alarm, or another one when read back."""
-    verdict = judge(solution, [])
-    if verdict.verdict == UNRELIABLE:
+    verdict = judge(solution, run_checks(solution))
+    if verdict.verdict in (UNRELIABLE, FAILED):
         return f"false alarm: {verdict.reason}"
+    verdict = judge(solution, [])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "pairs.vtkhdf")
         write_result(file, solution, [], {})

@@ -15,6 +15,7 @@ from solver.mesh.transforms import transform
 
 from .options import RIGID, Row
 from .places import Places
+from .reference import references
 from .state import AXES, GAP, MU, STRAIN, Body, Placed
 
 # The factor of the last step, where there are several.
@@ -144,6 +145,7 @@ class _Builder(Places):
         text |= _FORMS.get(row["form"], {})
         if row["steps"] != "one":
             _multiply(text, 1 / _LAST)
+        text |= references(self)
         return text | _STEPS.get(row["friction"], _STEPS.get(row["steps"], {}))
 
     def _material(self, body: Body) -> dict[str, Any]:

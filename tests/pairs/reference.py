@@ -1,0 +1,107 @@
+"""What a case file says of its exact state: the reference, the places that are seen, the tolerance.
+
+So what the checks make of a row, step by step, meets its options too.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from .places import Places
+from .state import GAP, Body
+
+TOLERANCE, STIFF = 1e-9, 1e-8
+# Of bent faces a little is not covered.
+_COVERAGE = 1e-6
+_COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+
+
+def references(places: Places) -> dict[str, Any]:
+    """The keys of the case file; none where the state has no value for all of its bodies."""
+    stiff = places.row["materials"] == "stiff master"
+    given = _of_zones(places) | _of_bodies(places, stiff)
+    if not given:
+        return {}
+    tolerance = STIFF if stiff else TOLERANCE
+    of_check = dict.fromkeys(("all", "element_gap", "balance"), tolerance)
+    seen = [{"zone": "one", "nearest": _place(places, 0.0)}]
+    seen += [{"zone": "two", "nearest": _place(places, 1.0)}] * places.second
+    text: dict[str, Any] = {
+        "reference": {"kind": "analytical"} | given,
+        "observe": seen,
+        "tolerance": of_check | dict.fromkeys(("coverage", "covered_pressure"), _COVERAGE),
+    }
+    if "displacement_at" in given:
+        text["probes"] = {name: {"at": _within(places, name)} for name in given["displacement_at"]}
+    return text
+
+
+def _factor(places: Places) -> float:
+    """What is left of stress and displacement in the last step."""
+    unloaded = places.row["steps"] == "unloaded" and places.row["friction"] != "slip back"
+    return 0.0 if unloaded else 1.0
+
+
+def _place(places: Places, height: float) -> list[float]:
+    """A place near the middle of an interface."""
+    return places.placed.point(np.array([places.start + 0.4, *[0.0] * (places.dim - 2), height]))
+
+
+def _within(places: Places, name: str) -> list[float]:
+    return places.placed.point(_middle(places, name))
+
+
+def _middle(places: Places, name: str) -> np.ndarray:
+    body = next(body for body in places.bodies if body.name == name)
+    return np.array([places.start + 0.5, *[0.5] * (places.dim - 2), body.low + 0.6])
+
+
+def _of_zones(places: Places) -> dict[str, Any]:
+    """What holds in all zones, and forces where there is one flat zone."""
+    row, dim, factor = places.row, places.dim, _factor(places)
+    lower, last = (body.stress[:dim, :dim] for body in (places.bodies[0], places.bodies[-1]))
+    normal = places.normal if row["interface"] in ("flat", "tilted") else np.eye(dim)[-1]
+    pressed = [0.0 if places.open else -float(normal @ lower @ normal)]
+    pressed += [-float(last[-1, -1])] * places.second
+    given: dict[str, Any] = {}
+    if np.ptp(pressed) <= 1e-12 * max(pressed):
+        given["contact_pressure"] = factor * pressed[0]
+    if not (places.second and places.open):
+        given["gap"] = GAP * places.placed.scale * places.open
+    if places.second or row["interface"] not in ("flat", "tilted") or not factor:
+        return given
+    traction = (0.0 if places.open else 1.0) * lower @ normal
+    if row["friction"] != "none":
+        along = traction - normal * (normal @ traction)
+        given["friction_traction"] = places.placed.vector(along)
+    if not places.axisymmetric and not places.open:
+        area = places.placed.scale ** (dim - 1) / normal[-1]
+        given |= {"force": places.placed.vector(area * traction), "contact_area": area}
+    return given
+
+
+def _of_bodies(places: Places, stiff: bool) -> dict[str, Any]:
+    """The stress where all have one, and displacements at a point of each body."""
+    given: dict[str, Any] = {}
+    bodies = [body for body in places.bodies if not body.rigid]
+    stress = [body.stress for body in bodies]
+    same = all(np.allclose(s, stress[0], atol=1e-12 * np.abs(stress[0]).max()) for s in stress)
+    if same and not stiff:
+        given["stress"] = _turned(places, stress[0])
+    if places.row["motion"] == "small" and places.row["form"] != "perturbed":
+        still = [body for body in bodies if body is bodies[0] or not places.apart.any()]
+        given["displacement_at"] = {body.name: _moved(places, body) for body in still}
+    return given
+
+
+def _turned(places: Places, stress: np.ndarray) -> dict[str, float]:
+    dim, size = places.dim, len(stress)
+    turn, whole = np.eye(3), np.zeros((3, 3))
+    turn[:dim, :dim], whole[:size, :size] = places.placed.turn, stress
+    whole = _factor(places) * turn @ whole @ turn.T
+    return {name: float(whole[k]) for name, k in _COMPONENTS.items() if max(k) < size}
+
+
+def _moved(places: Places, body: Body) -> list[float]:
+    local = body.gradient @ _middle(places, body.name) + body.shift
+    return [_factor(places) * places.placed.scale * v for v in places.placed.vector(local)]
