@@ -1,10 +1,11 @@
 """The checks of a solve against its reference, row by row of the table (`case.checks`).
 
 A check compares values with the reference at their own places: macro-element centres, nodes, or
-load steps. `error` is the largest deviation over the check's scale: the largest magnitude
-of the reference, or, where the reference is zero everywhere up to rounding, the quantity's own
-measure (load for stresses, load / stiffness × size for displacements; `SCALES`). A gap is always measured against the
-block size, status, coverage and balance against one. A value that is not a number fails.
+load steps. `error` is the largest deviation over the check's scale: the largest magnitude of the
+reference, or, where the reference is zero everywhere up to rounding, the quantity's own measure
+(load for stresses, load / stiffness × size for displacements; `SCALES`). A gap is always measured
+against the block size, status, coverage and balance against one. A value that is not a number
+fails.
 
 Accepted values are the last results that a person has reviewed, kept under version control beside
 the case file, in `regression/JOB.json`, one line a check, apart from the reference: a reference is
