@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .places import Places
-from .state import GAP, Body
+from .state import GAP, MU, SLIDE, Body
 
 TOLERANCE, STIFF = 1e-9, 1e-8
 # Of bent faces a little is not covered.
@@ -77,20 +77,36 @@ def _of_zones(places: Places) -> dict[str, Any]:
     if not places.axisymmetric and not places.open:
         area = places.placed.scale ** (dim - 1) / normal[-1]
         given |= {"force": places.placed.vector(area * traction), "contact_area": area}
+        if row["friction"] in ("held", "stick", "slip"):
+            slips = row["friction"] == "slip"
+            given["stick_area"] = 0.0 if slips else area
+            if row["steps"] == "one":
+                slip = SLIDE * places.placed.scale * slips
+                given["slip"] = places.placed.vector(slip * places.along)
+                given["dissipation"] = [MU * slip * area * pressed[0]]
     return given
 
 
 def _of_bodies(places: Places, stiff: bool) -> dict[str, Any]:
-    """The stress where all have one, and displacements at a point of each body."""
-    given: dict[str, Any] = {}
+    """The stress where all have one, values at a point of each body, what holds them, energy."""
+    given, row = dict[str, Any](), places.row
     bodies = [body for body in places.bodies if not body.rigid]
     stress = [body.stress for body in bodies]
     same = all(np.allclose(s, stress[0], atol=1e-12 * np.abs(stress[0]).max()) for s in stress)
     if same and not stiff:
         given["stress"] = _turned(places, stress[0])
-    if places.row["motion"] == "small" and places.row["form"] != "perturbed":
+    if row["motion"] == "small" and row["form"] != "perturbed":
         still = [body for body in bodies if body is bodies[0] or not places.apart.any()]
         given["displacement_at"] = {body.name: _moved(places, body) for body in still}
+        given["stress_at"] = {body.name: _turned(places, body.stress) for body in still}
+    if places.axisymmetric or row["interface"] != "flat" or row["form"] == "exchanged":
+        return given
+    size, factor = places.placed.scale, _factor(places)
+    pull = -bodies[0].stress[: places.dim, -1] * size ** (places.dim - 1)
+    given["reaction"] = {"lower-base": [factor * v for v in places.placed.vector(pull)]}
+    if row["also"] in ("nothing", "body force"):
+        work = sum(np.sum(b.stress[: places.dim, : places.dim] * b.gradient) for b in bodies)
+        given["strain_energy"] = factor * float(work) / 2 * size**places.dim
     return given
 
 
