@@ -36,9 +36,6 @@ from . import friction, hooke, numbers, samples
 from .inputs import accepted_file
 from .verdict import CheckResult, Regression, extremes
 
-# A reference below this share of the quantity's own measure is the rounding of one that is zero.
-_ROUNDED = 1e-14
-
 
 def unit(_: Solution) -> float:
     """One."""
@@ -169,9 +166,8 @@ def _judge(
     tolerance: float,
 ) -> CheckResult:
     name = zone.name if zone else None
-    magnitude = float(np.abs(sample.reference).max(initial=0.0))
     measure = SCALES[check.scale](solution)
-    scale = measure if check.fixed or magnitude <= _ROUNDED * measure else magnitude
+    scale = measure if check.fixed else samples.magnitude(sample.reference, measure) or measure
     deviation = np.abs(sample.values - sample.reference)
     if deviation.size:
         worst = int(np.argmax(deviation))  # the first that is not a number, if any

@@ -23,6 +23,8 @@ from .coverage import expected_coverage
 Reference = Any
 # Pressures and gaps below this share of load and length are zero.
 _TOUCHING = 1e-12
+# A reference below this share of its quantity's own measure is the rounding of one that is zero.
+_ROUNDED = 1e-14
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,12 @@ class Sample:
 
 
 Sampler = Callable[[Solution, Any, Reference], Sample | None]
+
+
+def magnitude(reference: np.ndarray, measure: float) -> float:
+    """The largest size of a reference (n,); zero where that is rounding beside the `measure`."""
+    found = float(np.abs(reference).max(initial=0.0))
+    return 0.0 if found <= _ROUNDED * measure else found
 
 
 def _at_macro_elements(values: np.ndarray, expected: np.ndarray) -> Sample:

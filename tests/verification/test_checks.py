@@ -315,3 +315,14 @@ def test_errors_do_not_depend_on_the_units_of_stress(tmp_path_factory, index, ch
     scaled.zones[0].multiplier[:] = plain.zones[0].multiplier * scale
     errors = [by_name(s)["multiplier"].error for s in (plain, scaled)]
     assert errors[1] == pytest.approx(errors[0], rel=1e-9, abs=1e-14)
+
+
+def test_a_reference_that_is_zero_but_for_rounding_is_measured_against_the_load(tmp_path):
+    """25 sin π is 3e-15; so is what a solve may find."""
+    text = PLANE.replace("contact_pressure: 25.0", "contact_pressure: 25*sin(pi)")
+    solution = plane(tmp_path, text)
+    solution.zones[0].multiplier[:] = -3e-15
+    solution.zones[0].closed[:] = False
+    for step in solution.steps:
+        step.observations[0]["pressure"] = 0.0
+    assert failing(solution) == set()
