@@ -56,21 +56,41 @@ def of_mesh(found: meshio.Mesh) -> Raw:
 
 
 def read_vtkhdf(path: Path) -> Raw:
-    """Point and cell data of an unstructured grid in one piece, written by us or by others."""
+    """Point and cell data of an unstructured grid in one piece, written by us or by others.
+
+    Of a series of steps those of the last one. A result of this program has bodies that move far
+    where they are: they are brought back to where they were, and displaced by their `motion` too.
+    """
     with h5py.File(path) as file:
         group = file.get("VTKHDF")
         if group is None or "Connectivity" not in group:
             raise InputError(path, "grid", None, "not an unstructured grid of VTKHDF")
         if len(group["NumberOfPoints"]) != 1:
-            raise InputError(path, "grid", None, "must be one piece at one time")
+            raise InputError(
+                path, "grid", None, "must be one piece with the same cells at all steps"
+            )
         cells, pieces = read_cells(group)
-        mesh = plain_mesh(group["Points"][()], cells)
-        fields = {n: at_nodes(mesh.points, d[()]) for n, d in group.get("PointData", {}).items()}
+        points = _last(group, "Points", "PointOffsets")
+        data = {name: _last(group, f"PointData/{name}") for name in group.get("PointData", {})}
+        if "motion" in data and "displacement" in data:
+            motion = data.pop("motion")
+            points, data["displacement"] = points - motion, data["displacement"] + motion
+        mesh = plain_mesh(points, cells)
+        fields = {name: at_nodes(mesh.points, values) for name, values in data.items()}
         for name, data in group.get("CellData", {}).items():
             if name not in fields and data.dtype.kind in "iuf":
-                values = data[()]
+                values = _last(group, f"CellData/{name}")
                 fields[name] = at_cells(mesh, [values[start:stop] for start, stop in pieces])
     return Raw(mesh, fields)
+
+
+def _last(group: h5py.Group, name: str, offsets: str = "") -> np.ndarray:
+    """The rows of a data set that belong to the last step; all of them where there are no steps."""
+    kind, _, field = name.partition("/")
+    starts = group.get(f"Steps/{offsets or f'{kind}Offsets/{field}'}")
+    count = "NumberOfCells" if kind == "CellData" else "NumberOfPoints"
+    start, rows = 0 if starts is None else int(np.ravel(starts[()])[-1]), int(group[count][0])
+    return np.asarray(group[name][start : start + rows])
 
 
 def read_med(path: Path) -> Raw:
