@@ -267,16 +267,14 @@ def _shares(solution: Solution, exact: bool) -> list[float | None]:
     All grows with the load factor where surfaces touch from the start and nothing slips back.
     """
     case, factors = solution.case, [step.factor for step in solution.steps]
-    last, back = factors[-1], case.frictional and bool((np.diff(factors) < 0).any())
-    if case.histories or not last:
-        return [1.0 if factor == last else None for factor in factors]
-    if exact:
+    last, of_factors = factors[-1], bool(factors[-1]) and not case.histories
+    if exact and of_factors:
         return [1.0 if factor == 1 else None for factor in factors]
-    if back:
-        return [*(None for _ in factors[1:]), 1.0]
-    if case.moving or _apart(solution):
-        return [1.0 if factor == last and not case.frictional else None for factor in factors]
-    return [factor / last if factor / last >= 0 else None for factor in factors]
+    back = case.frictional and bool((np.diff(factors) < 0).any())
+    if of_factors and not (back or case.moving or _apart(solution)):
+        return [factor / last if factor / last >= 0 else None for factor in factors]
+    again = (factor == last and not case.frictional for factor in factors[:-1])
+    return [*(1.0 if alike else None for alike in again), 1.0]
 
 
 def _apart(solution: Solution) -> bool:

@@ -72,7 +72,7 @@ def read_vtkhdf(path: Path) -> Raw:
         cells, pieces = read_cells(group)
         points = _last(group, "Points", "PointOffsets")
         data = {name: _last(group, f"PointData/{name}") for name in group.get("PointData", {})}
-        if "motion" in data and "displacement" in data:
+        if "layout" in file.attrs and "motion" in data:
             motion = data.pop("motion")
             points, data["displacement"] = points - motion, data["displacement"] + motion
         mesh = plain_mesh(points, cells)
