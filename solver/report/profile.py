@@ -16,7 +16,7 @@ from ..lac.cells.faces import surface_points
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..verification.coverage import expected_coverage
-from ..verification.samples import magnitude, reference_where_covered
+from ..verification.samples import reference_where_covered
 from ..verification.units import with_unit
 from .charts import (
     BLUE,
@@ -268,10 +268,7 @@ def _within_faces(solution: Solution, zone: ZoneResult, place: Place) -> list[di
 def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
     """The reference's pressure (m,) on macro-elements, zero on uncovered ones; None without one."""
     against = reference(solution, "contact_pressure")
-    if against is None:
-        return None
-    found = reference_where_covered(solution, zone, against)
-    return found if magnitude(found, solution.scalars.load_scale) else np.zeros_like(found)
+    return None if against is None else reference_where_covered(solution, zone, against)
 
 
 def reference(solution: Solution, key: str) -> Any:

@@ -59,9 +59,10 @@ def expected_pressure(zone: ZoneResult, reference: Reference) -> np.ndarray:
 def reference_where_covered(
     solution: Solution, zone: ZoneResult, reference: Reference
 ) -> np.ndarray:
-    """The reference's pressure (m,), zero where nothing is covered."""
+    """The reference's pressure (m,), zero where nothing is covered, or where all is rounding."""
     expected = expected_pressure(zone, reference)
-    return np.where(expected_coverage(solution, zone, reference) > 0, expected, 0.0)
+    expected = np.where(expected_coverage(solution, zone, reference) > 0, expected, 0.0)
+    return expected if magnitude(expected, solution.scalars.load_scale) else 0.0 * expected
 
 
 def pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:

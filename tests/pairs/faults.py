@@ -225,7 +225,7 @@ FAULTS = (
     ),
     Fault(
         "steps-across-a-gap",
-        "pressures of all steps are held against a share of the last one's, across a gap too",
+        "pressure is assumed to grow with the load factor even where the surfaces start apart",
         {"gap": "interference", "steps": "factors"},
         samples,
         "_apart",
@@ -233,7 +233,7 @@ FAULTS = (
     ),
     Fault(
         "positions-under-other-loads",
-        "every position is held against the pressure of the last one",
+        "the pressure at every position is compared with the last one, whatever the loads",
         {"motion": "large", "steps": "factors"},
         numbers,
         "_as_in_the_last",

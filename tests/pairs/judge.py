@@ -74,15 +74,15 @@ def tried(row: Row) -> Outcome:
 
 def _amiss(solution: Solution) -> str:
     """What the program makes of an exact result: an alarm, or another one when read back."""
-    verdict = judge(solution, run_checks(solution))
+    checks = run_checks(solution)
+    verdict = judge(solution, checks)
     if verdict.verdict in (UNRELIABLE, FAILED):
         return f"false alarm: {verdict.reason}"
-    verdict = judge(solution, [])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "pairs.vtkhdf")
         write_result(file, solution, [], {})
         again = read_result(file).solution
-    same = judge(again, []).plain() == verdict.plain() and read_back(solution, again)
+    same = judge(again, checks).plain() == verdict.plain() and read_back(solution, again)
     return "" if same else "read back as another result"
 
 

@@ -38,7 +38,7 @@ _MULTIPLIED = {
 
 @dataclass
 class Problem:
-    """A case on its mesh, as it is solved, and what must come out."""
+    """A case on its mesh, as it is solved, and what must come out; `factor`: see `States`."""
 
     case: Case
     mesh: meshio.Mesh
@@ -46,11 +46,7 @@ class Problem:
     placed: Placed
     text: dict[str, Any]
     open: bool
-
-    @property
-    def factor(self) -> float:
-        """What is left of the state in the last step."""
-        return 0.0 if self.case.steps[-1] == 0 else 1.0
+    factor: float
 
 
 def problem_of(row: Row) -> Problem:
@@ -82,7 +78,7 @@ class _Builder(Places):
         case, mesh = case.as_solved(swapped=self.row["form"] == "exchanged"), self.mesh()
         if case.mesh.transform:
             mesh = transform(mesh, case.mesh.transform, "pairs")
-        return Problem(case, mesh, self.bodies, self.placed, text, self.open)
+        return Problem(case, mesh, self.bodies, self.placed, text, self.open, self.factor)
 
     def _zone(self) -> dict[str, Any]:
         row = self.row

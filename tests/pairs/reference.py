@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .options import SHAPED
 from .places import Places
 from .state import GAP, MU, SLIDE, Body
 
@@ -36,12 +37,6 @@ def references(places: Places) -> dict[str, Any]:
     return text
 
 
-def _factor(places: Places) -> float:
-    """What is left of stress and displacement in the last step."""
-    unloaded = places.row["steps"] == "unloaded" and places.row["friction"] != "slip back"
-    return 0.0 if unloaded else 1.0
-
-
 def _place(places: Places, height: float) -> list[float]:
     """A place near the middle of an interface."""
     return places.placed.point(np.array([places.start + 0.4, *[0.0] * (places.dim - 2), height]))
@@ -58,9 +53,10 @@ def _middle(places: Places, name: str) -> np.ndarray:
 
 def _of_zones(places: Places) -> dict[str, Any]:
     """What holds in all zones, and forces where there is one flat zone."""
-    row, dim, factor = places.row, places.dim, _factor(places)
+    row, dim, factor = places.row, places.dim, places.factor
+    shaped = row["interface"] in SHAPED
     lower, last = (body.stress[:dim, :dim] for body in (places.bodies[0], places.bodies[-1]))
-    normal = places.normal if row["interface"] in ("flat", "tilted") else np.eye(dim)[-1]
+    normal = np.eye(dim)[-1] if shaped else places.normal
     pressed = [0.0 if places.open else -float(normal @ lower @ normal)]
     pressed += [-float(last[-1, -1])] * places.second
     given: dict[str, Any] = {}
@@ -68,7 +64,7 @@ def _of_zones(places: Places) -> dict[str, Any]:
         given["contact_pressure"] = factor * pressed[0]
     if not (places.second and places.open):
         given["gap"] = GAP * places.placed.scale * places.open
-    if places.second or row["interface"] not in ("flat", "tilted") or not factor:
+    if places.second or shaped or not factor:
         return given
     traction = (0.0 if places.open else 1.0) * lower @ normal
     if row["friction"] != "none":
@@ -101,7 +97,7 @@ def _of_bodies(places: Places, stiff: bool) -> dict[str, Any]:
         given["stress_at"] = {body.name: _turned(places, body.stress) for body in still}
     if places.axisymmetric or row["interface"] != "flat" or row["form"] == "exchanged":
         return given
-    size, factor = places.placed.scale, _factor(places)
+    size, factor = places.placed.scale, places.factor
     pull = -bodies[0].stress[: places.dim, -1] * size ** (places.dim - 1)
     given["reaction"] = {"lower-base": [factor * v for v in places.placed.vector(pull)]}
     if row["also"] in ("nothing", "body force"):
@@ -114,10 +110,10 @@ def _turned(places: Places, stress: np.ndarray) -> dict[str, float]:
     dim, size = places.dim, len(stress)
     turn, whole = np.eye(3), np.zeros((3, 3))
     turn[:dim, :dim], whole[:size, :size] = places.placed.turn, stress
-    whole = _factor(places) * turn @ whole @ turn.T
+    whole = places.factor * turn @ whole @ turn.T
     return {name: float(whole[k]) for name, k in _COMPONENTS.items() if max(k) < size}
 
 
 def _moved(places: Places, body: Body) -> list[float]:
     local = body.gradient @ _middle(places, body.name) + body.shift
-    return [_factor(places) * places.placed.scale * v for v in places.placed.vector(local)]
+    return [places.factor * places.placed.scale * v for v in places.placed.vector(local)]

@@ -127,6 +127,13 @@ class States:
         return {"stick": 0.5 * MU, "slip": MU, "slip back": -MU}.get(self.row["friction"], 0.0)
 
     @property
+    def factor(self) -> float:
+        """What is left of the state in the last step."""
+        return (
+            0.0 if self.row["steps"] == "unloaded" and self.row["friction"] != "slip back" else 1.0
+        )
+
+    @property
     def apart(self) -> np.ndarray:
         """How far the upper bodies are meshed from where they touch."""
         far = {"meshed": GAP, "open": 2 * GAP, "clearance, overlap": -OVERLAP}

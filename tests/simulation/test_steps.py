@@ -171,20 +171,11 @@ def test_places_are_observed_against_the_last_factor():
     assert found["observation"].maximum == pytest.approx(16.5)
 
 
-PRESSED = """\
-name: steps
-mesh: {recipe: blocks, size: 1.0}
-plane: strain
-materials: {all: {young: 2000.0, poisson: 0.0}}
-supports:
-  - {group: base, fix: [y]}
-  - {group: symx, fix: [x]}
-  - {group: press, fix: {y: -0.02}}
-contact: [{name: zone, slave: bottom_contact, master: top_contact}]
-observe: [{zone: zone, nearest: [0, 0]}]
-steps: [0.5, 1.0]
-reference: {kind: analytical, contact_pressure: 20.0, gap: 0.0}
-"""
+_LOADS = CASE[CASE.index("loads:") : CASE.index("contact:")]
+PRESSED = (
+    replaced(CASE, ("0.3", "0.0"), (_LOADS, "  - {group: press, fix: {y: -0.02}}\n"))
+    + "steps: [0.5, 1.0]\nreference: {kind: analytical, contact_pressure: 20.0, gap: 0.0}\n"
+)
 # What changes, the pressure and gap of both steps, and how many of them are compared.
 APART = {
     "touching": ((), (10.0, 20.0), (0.0, 0.0), 2),

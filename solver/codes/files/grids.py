@@ -14,7 +14,7 @@ import meshio
 import numpy as np
 
 from ...mesh.files import med
-from ...mesh.files.vtkhdf import read_cells
+from ...mesh.files.vtkhdf import last_of, read_cells
 from ...system.errors import InputError
 from .raw import Raw, RawField, at_cells, at_nodes, plain_mesh
 
@@ -70,8 +70,8 @@ def read_vtkhdf(path: Path) -> Raw:
                 path, "grid", None, "must be one piece with the same cells at all steps"
             )
         cells, pieces = read_cells(group)
-        points = _last(group, "Points", "PointOffsets")
-        data = {name: _last(group, f"PointData/{name}") for name in group.get("PointData", {})}
+        points = last_of(group, "Points")
+        data = {name: last_of(group, f"PointData/{name}") for name in group.get("PointData", {})}
         if "layout" in file.attrs and "motion" in data:
             motion = data.pop("motion")
             points, data["displacement"] = points - motion, data["displacement"] + motion
@@ -79,18 +79,9 @@ def read_vtkhdf(path: Path) -> Raw:
         fields = {name: at_nodes(mesh.points, values) for name, values in data.items()}
         for name, data in group.get("CellData", {}).items():
             if name not in fields and data.dtype.kind in "iuf":
-                values = _last(group, f"CellData/{name}")
+                values = last_of(group, f"CellData/{name}")
                 fields[name] = at_cells(mesh, [values[start:stop] for start, stop in pieces])
     return Raw(mesh, fields)
-
-
-def _last(group: h5py.Group, name: str, offsets: str = "") -> np.ndarray:
-    """The rows of a data set that belong to the last step; all of them where there are no steps."""
-    kind, _, field = name.partition("/")
-    starts = group.get(f"Steps/{offsets or f'{kind}Offsets/{field}'}")
-    count = "NumberOfCells" if kind == "CellData" else "NumberOfPoints"
-    start, rows = 0 if starts is None else int(np.ravel(starts[()])[-1]), int(group[count][0])
-    return np.asarray(group[name][start : start + rows])
 
 
 def read_med(path: Path) -> Raw:

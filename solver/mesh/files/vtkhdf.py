@@ -175,6 +175,18 @@ def read_cells(group: h5py.Group) -> tuple[list[tuple[str, np.ndarray]], list[tu
     return cells, bounds
 
 
+def last_of(group: h5py.Group, name: str) -> np.ndarray:
+    """The rows of a data set of a grid that belong to its last step, or all without steps.
+
+    `name`: Points, or that of a field, as PointData/displacement. Earlier steps stand first.
+    """
+    kind, _, field = name.partition("/")
+    starts = group.get(f"Steps/{kind}Offsets/{field}" if field else "Steps/PointOffsets")
+    count = "NumberOfCells" if kind == "CellData" else "NumberOfPoints"
+    start, rows = 0 if starts is None else int(np.ravel(starts[()])[-1]), int(group[count][0])
+    return np.asarray(group[name][start : start + rows])
+
+
 def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
     """The mesh of a grid that `write_grid` wrote at its last position, and its fields."""
     dim = int(group.attrs["Dimension"])
@@ -188,12 +200,10 @@ def read_grid(group: h5py.Group) -> tuple[meshio.Mesh, dict, dict]:
         ]
     for name, ids in groups["nodes"].items():
         point_sets[_plain(name)] = ids[()]
-    count = {"PointData": -int(group["NumberOfPoints"][0]), "CellData": -bounds[-1][1]}
-    points = group["Points"][count["PointData"] :, :dim]
+    points = last_of(group, "Points")[:, :dim]
     mesh = meshio.Mesh(points, cells, cell_sets=cell_sets, point_sets=point_sets)
-    # Fields of earlier positions stand first.
-    data = ({n: d[of:] for n, d in group[kind].items()} for kind, of in count.items())
-    return mesh, *data
+    kinds = "PointData", "CellData"
+    return mesh, *({n: last_of(group, f"{kind}/{n}") for n in group[kind]} for kind in kinds)
 
 
 def check_name(path: Path) -> None:

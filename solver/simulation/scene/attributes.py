@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -103,6 +103,11 @@ class Attributes(CutGroups):
     def at_rest(self) -> Attributes:
         """Those of the mesh as given."""
         return self
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What parts make on this mesh once, by name: for bodies that move far."""
+        return {}
 
     @property
     def motion(self) -> np.ndarray:

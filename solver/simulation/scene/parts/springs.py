@@ -41,14 +41,21 @@ class Springs(ModelPart):
 
 def springs_of(groups: Attributes) -> Springs:
     """The springs and foundations of a case; InputError where one has no positive stiffness."""
-    drawn, groups = groups.motion, groups.at_rest
+    kept = groups.at_rest.kept
+    if Springs.holder not in kept:
+        kept[Springs.holder] = _whole(groups.at_rest)
+    return Springs(kept[Springs.holder], groups.motion)
+
+
+def _whole(groups: Attributes) -> sparse.csr_matrix:
+    """The stiffness (n_dofs, n_dofs) of all of them."""
     total = sparse.csr_matrix((groups.points.size, groups.points.size))
     for i, support in enumerate(groups.case.supports):
         for direction, value in support.spring.items():
             total = total + _spring(
                 groups, support.group, direction, value, f"supports[{i}].spring.{direction}"
             )
-    return Springs(total, drawn)
+    return total
 
 
 def _spring(
