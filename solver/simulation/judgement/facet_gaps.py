@@ -55,10 +55,11 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     """What facets do to a state, its status kept.
 
     Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
-    nodes. The elastic closing is twice the strain energy over ∫ p, the largest it can be.
+    nodes. A pressure below its round-off is none. The elastic closing is twice the strain energy over ∫ p, the largest it can be.
     """
     scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
-    pushed = np.maximum(state.pressure, 0.0) * problem.constraints.covered
+    presses = state.pressure > state.trial.pressure_limit
+    pushed = np.where(presses, state.pressure, 0.0) * problem.constraints.covered
     force = float(pushed[: scene.n_multipliers].sum())
     closing = 2 * strain_energy(state) / force if force > 0 else 0.0
     for zone in scene.zones:
@@ -82,7 +83,7 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     for zone in scene.zones:
         weight, mine = zone.operator.covered, zone.numbers
         size = weight @ state.pressure[mine] ** 2
-        if gaps[mine].any() and size > 0:
+        if gaps[mine].any():
             shares.append(float(np.sqrt(weight @ change[mine] ** 2 / size)))
     return FacetEffect(max(shares), depth)
 

@@ -19,11 +19,11 @@ from ...lac.threads import prefetch
 from ...mechanics.fem.stress import largest_strain
 from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
-from ..equilibrium.state import AT_REST, Equilibrium, forces_at_work
+from ..equilibrium.state import Equilibrium
 from ..results.records import Validity
 from ..results.solution import Line
 from ..scene.scene import Scene, ZoneScene
-from .facet_gaps import FacetEffect, facets_of
+from .facet_gaps import facets_of
 
 # Cells that are looked at together.
 _AT_ONCE = 1 << 14
@@ -136,8 +136,6 @@ _SMALL_SLIP = 1.0
 _NOTED_UNPAIRED, _UNPAIRED = 1e-3, 1e-2
 # The same for the change of a pressure by facets, and how deep they are, in elastic closings.
 _NOTED_FACETS, _FACETS, _DEPTH = 1e-2, 0.1, 2.0
-# Forces below this share of those of all steps are none.
-_PRESSED = 1e-9
 NOTED_DEPTH = 0.1
 """Deeper facets than this, in elastic closings, are worth a word."""
 # The checks of a pressure along the surface whose tolerance may be wider.
@@ -152,9 +150,7 @@ OF_PRESSURE = (
 
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
-    scene, facets = problem.scene, FacetEffect(0.0, 0.0)
-    if not _at_rest(problem, states[-1]):
-        facets = facets_of(problem, states[-1])
+    scene, facets = problem.scene, facets_of(problem, states[-1])
     solid, apart, found = meshed(scene), _apart(scene), []
     for state in states:
         moved, closed = state.displacement, state.status.closed
@@ -172,16 +168,6 @@ def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity
         )
         found.append(one)
     return Validity.worst(found)
-
-
-def _at_rest(problem: ContactProblem, state: Equilibrium) -> bool:
-    """Whether contact presses by round-off alone, as where the loads of other steps are gone."""
-    pressed = (problem.constraints.covered * state.pressure).max(initial=0.0)
-    acting = max(float(np.abs(state.force).max()), pressed)
-    could = forces_at_work(problem.scene, state.displacement)
-    return bool(
-        acting < _PRESSED * problem.scene.loads.at_work.force or 0 < acting < AT_REST * could
-    )
 
 
 def _apart(scene: Scene) -> np.ndarray:
