@@ -24,11 +24,12 @@ from .arguments import (
     checked_vector,
 )
 from .cells.faces import surface_points
+from .cells.neighbours import vertex_neighbours
 from .errors import SolveError
 from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import gap_operator
-from .reconstruction import form_of, vertex_neighbours
+from .reconstruction import form_of
 from .recovery import Recovery, RecoveryRequest, with_status
 from .roughness import Smooth, smoothed
 from .saddle_point import SaddlePoint, numbered

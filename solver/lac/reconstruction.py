@@ -16,18 +16,17 @@ and the means of p* are not p.
 Source: Barth, Frederickson, AIAA 90-0013 (1990).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy import sparse
 
+from .cells.neighbours import SAME_SIDE
+
 # A macro-element covered by less than a quarter of its area is no neighbour: its mean is of little
-# use to others. Meshes have exact quarters, and kinks of exactly 30°: rounding decides neither.
+# use to others. Meshes have exact quarters: rounding does not decide.
 MIN_SHARE = 0.25 - 1e-9
-SAME_SIDE = np.cos(np.radians(30)) + 1e-9
-"""Neighbours' normals differ by less than 30°: across a kink the pressure may jump."""
 # Neighbours lie on one side where their mean direction is longer than this; unit vectors to the
 # five neighbours of a square at a border have a mean of 0.48.
 _ONE_SIDE = 0.4
@@ -165,23 +164,6 @@ class Reconstruction:
     degree: np.ndarray
 
 
-def vertex_neighbours(faces: Sequence[tuple[np.ndarray, np.ndarray]], m: int) -> sparse.csr_matrix:
-    """Pairs (m, m) of macro-elements that share a vertex, each with itself too.
-
-    `faces`, by block: macro-element (n,) and vertices (n, v).
-
-    >>> vertex_neighbours([(np.arange(3), np.array([[0, 1], [1, 2], [2, 3]]))], 3).toarray()
-    array([[ True,  True, False],
-           [ True,  True,  True],
-           [False,  True,  True]])
-    """
-    owner = np.concatenate([np.repeat(n, v.shape[1]) for n, v in faces])
-    vertex = np.concatenate([v.ravel() for _, v in faces])
-    ones = np.ones(len(owner))
-    touches = sparse.csr_matrix((ones, (owner, vertex)), shape=(m, int(vertex.max()) + 1))
-    return (touches @ touches.T).astype(bool).tocsr()
-
-
 def reconstruct(
     at: Moments, near: sparse.csr_matrix, closed: np.ndarray, form: Form
 ) -> Reconstruction:
@@ -197,7 +179,7 @@ def reconstruct(
     ...               spread=np.full((3, 1, 1), 1 / 12))
     >>> row = Moments(share=np.ones(3), spread=np.tile(np.diag([1 / 12, 0.0]), (3, 1, 1)),
     ...               normal=np.tile([0.0, 1.0], (3, 1)), local=local)
-    >>> near = vertex_neighbours([(np.arange(3), np.array([[0, 1], [1, 2], [2, 3]]))], 3)
+    >>> near = sparse.csr_matrix([[1, 1, 0], [1, 1, 1], [0, 1, 1]], dtype=bool)
     >>> found = reconstruct(row, near, np.ones(3, dtype=bool), FORMS["linear"])
     >>> (found.matrix @ [9.0, 7.0, 5.0]).round(12)
     array([-2., -2., -2.])

@@ -20,7 +20,6 @@ from ..lac.errors import SolveError
 from ..system.errors import InputError
 from ..system.progress import Clock, stage
 from .equilibrium.problem import ContactProblem
-from .equilibrium.recovery import Recovered
 from .equilibrium.state import Equilibrium
 from .equilibrium.step import solve_step
 from .finished import called, finished, tell
@@ -61,11 +60,10 @@ class _Place:
 
 @dataclass(frozen=True)
 class _Solved:
-    """A solved step: its place, the problem there, its recovered pressure, and the rounds."""
+    """A solved step: its place, the problem there, and the rounds."""
 
     place: _Place
     problem: ContactProblem
-    field: Recovered
     rounds: int
 
 
@@ -125,14 +123,14 @@ def _in_place(
             raise SolveError(f"{error.key}: {error.problem}") from None
         with stage(clock, "solve"):
             goes_on = _from_there(last.state) if last and scene.case.frictional else None
-            state, field = solve_step(problem, _STEP, goes_on)
+            state = solve_step(problem, _STEP, goes_on)
         wanted, _ = predicted(rest, step, settled(groups, state.displacement, held))
         following = _followed(rest, faces, frames, wanted)
         moves = (following.turn != frames.turn).any(axis=(1, 2))
         moves |= (following.shift != frames.shift).any(axis=1)
         _LOG.info("round %d: %d bodies went on", count, moves.sum())
         if not moves.any():
-            return _Solved(_Place(groups, state), problem, field, count)
+            return _Solved(_Place(groups, state), problem, count)
         frames = following
     raise SolveError(f"{body_names(scene)[int(moves.argmax())]} finds no place: it still moves")
 
@@ -193,7 +191,7 @@ def _solution(
     problem, place = solved.problem, solved.place
     state, groups = place.state, place.groups
     plan = [*decided(problem), *plan_notes(problem, [state], len(before) + 1)]
-    found = solution_of(problem, [state], [solved.field], plan)
+    found = solution_of(problem, [state], plan)
     found.quality.validity = validity(problem, [state])
     found.fields.motion = groups.motion
     (step,) = found.steps

@@ -9,7 +9,6 @@ from ..case.model import Case
 from ..lac.errors import SolveError
 from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .equilibrium.problem import ContactProblem
-from .equilibrium.recovery import Recovered
 from .equilibrium.state import Equilibrium
 from .equilibrium.step import solve_step
 from .finished import called, finished, tell
@@ -66,14 +65,14 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
     plan = list(decided(problem))
     for line in plan:
         _LOG.info("plan: %s (%s)", line.what, line.why)
-    states, fields, ended = list[Equilibrium](), list[Recovered](), ""
+    states, ended = list[Equilibrium](), ""
     with stage(clock, "solve"):
         for factor, step in zip(case.factors, case.steps, strict=True):
             try:
                 last = states[-1] if states else None
                 before = case.steps[len(states) - 1] if states else None
                 start = last.status.closed if last else None
-                state, field = solve_step(problem, step, last, start, before)
+                state = solve_step(problem, step, last, start, before)
             except SolveError as error:
                 ended = f"{called(step, factor)}: {error}" if len(case.steps) > 1 else str(error)
                 if not states:
@@ -81,11 +80,10 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
                 problem.scene = replace(scene, case=case.until(len(states)))
                 break
             states.append(state)
-            fields.append(field)
             tell(called(step, factor), state, scene.n_multipliers)
     plan += plan_notes(problem, states)
     with stage(clock, "recovery"):
-        solution = solution_of(problem, states, fields, plan)
+        solution = solution_of(problem, states, plan)
         solution.quality.validity = validity(problem, states)
     return finished(solution, clock, ended)
 

@@ -36,8 +36,8 @@ from ..mechanics.fem.elasticity import internal_force
 from ..mechanics.fem.stress import nodal_stress
 from ..mechanics.linear.condensation import CondensedSystem
 from ..mesh import generate, transform
+from ..simulation.equilibrium.accuracy import Accuracy
 from ..simulation.equilibrium.problem import ContactProblem
-from ..simulation.equilibrium.state import Accuracy
 from ..simulation.options import Options, Safeguards
 from ..simulation.scene.parts.mixed import MixedForm
 from ..simulation.scene.scene import Scene, build_scene, carried_over

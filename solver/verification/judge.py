@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..case.model import AS_WRITTEN, SolvedAs
-from ..simulation.equilibrium.state import Accuracy
+from ..simulation.equilibrium.accuracy import Accuracy
 from ..simulation.judgement.validity import broken_by_facets, limits_passed
 from .scatter import unresolved
 from .units import derived

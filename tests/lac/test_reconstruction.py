@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.neighbours import vertex_neighbours
 from solver.lac.facets import facets
 from solver.lac.operator import gap_operator, meet_in_segments
-from solver.lac.reconstruction import FORMS, Local, Moments, reconstruct, vertex_neighbours
+from solver.lac.reconstruction import FORMS, Local, Moments, reconstruct
 from solver.lac.recovery import moments
 
 

@@ -115,7 +115,7 @@ def _normalised_one_by_one(_: Any) -> Any:
 def _slips_of_all(true: Any) -> Any:
     def result(scene: Any, zone: Any, state: Any, *more: Any) -> Any:
         found = true(scene, zone, state, *more)
-        friction = state.friction and zone_friction(zone, state, None)
+        friction = state.friction and zone_friction(zone, state)
         return replace(found, friction=friction)
 
     return result

@@ -12,8 +12,8 @@ from solver.lac.cells.catalogue import BY_NAME
 from solver.mechanics.fem.block import Block
 from solver.mechanics.fem.stress import largest_strain
 from solver.mesh import generate, transform
+from solver.simulation.equilibrium.accuracy import Accuracy, estimate, rounding
 from solver.simulation.equilibrium.problem import ContactProblem
-from solver.simulation.equilibrium.state import Accuracy, estimate, rounding
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study

@@ -12,6 +12,7 @@ from solver.case.reader import parse_case
 from solver.commands.cli import main
 from solver.lac import reconstruction as mortar
 from solver.lac.cells.catalogue import BY_NAME
+from solver.lac.cells.neighbours import vertex_neighbours
 from solver.lac.reconstruction import FORMS
 from solver.lac.recovery import Recovery
 from solver.mesh import generate
@@ -232,7 +233,7 @@ def test_a_macro_element_that_is_hardly_covered_is_no_neighbour():
         ),
     )
     chain = np.stack([np.arange(5), np.arange(1, 6)], axis=1)
-    near = mortar.vertex_neighbours([(np.arange(5), chain)], 5)
+    near = vertex_neighbours([(np.arange(5), chain)], 5)
     found = mortar.reconstruct(at, near, np.ones(5, dtype=bool), FORMS["linear"])
     assert (found.matrix[:4, 4].toarray() == 0).all()
     assert (found.matrix @ [1.0, 2.0, 3.0, 4.0, 99.0])[:4] == pytest.approx(1.0)
@@ -252,7 +253,7 @@ def test_faces_around_a_kink_are_no_neighbours():
         ),
     )
     chain = np.stack([np.arange(4), np.arange(1, 5)], axis=1)
-    near = mortar.vertex_neighbours([(np.arange(4), chain)], 4)
+    near = vertex_neighbours([(np.arange(4), chain)], 4)
     found = mortar.reconstruct(at, near, np.ones(4, dtype=bool), FORMS["linear"]).matrix
     assert (found[:2, 2:].toarray() == 0).all()
     assert (found[2:, :2].toarray() == 0).all()
@@ -287,7 +288,7 @@ def test_a_quadratic_pressure_is_found_from_its_means_on_any_triangles():
         return 5 + y @ [1.0, -2.0] + np.einsum("...i,ij,...j->...", y, curve, y)
 
     mean = pressure(centre[:, :2]) + np.einsum("nij,ij->n", spread[:, :2, :2], curve)
-    near = mortar.vertex_neighbours([(np.arange(m), faces)], m)
+    near = vertex_neighbours([(np.arange(m), faces)], m)
     found = mortar.reconstruct(at, near, np.ones(m, dtype=bool), FORMS["quadratic"])
     assert (found.degree == 2).all()
     psi = at.local.shapes(np.arange(m), x, FORMS["quadratic"])

@@ -16,8 +16,9 @@ from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
+from .accuracy import AT_REST, forces_at_work
 from .problem import ContactProblem
-from .state import AT_REST, Equilibrium, Friction, forces_at_work
+from .state import Equilibrium, Friction
 
 _LOG = logging.getLogger(__name__)
 # Corrections of the jumps, and the fault of the law by the largest force that ends them; they end

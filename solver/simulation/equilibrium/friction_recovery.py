@@ -20,7 +20,7 @@ from ...lac.recovery import settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import Recovered, RecoveredZone, ZoneFit, fit_of, recovered, settles
+from .recovery import ZoneFit, fit_of, recovered, settles
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -86,8 +86,8 @@ class _Loads:
 
 def solve_and_recover(
     problem: ContactProblem, step: Step, before: Equilibrium | None
-) -> tuple[Equilibrium, Recovered]:
-    """Equilibrium at a step after the state `before`, and its recovered pressure by zone.
+) -> Equilibrium:
+    """Equilibrium at a step after the state `before`, with its recovered pressure by zone.
 
     Where the state does not settle under the correction, it stays as it is and no pressure is
     recovered. Raises SolveError where there is no equilibrium.
@@ -126,15 +126,9 @@ def solve_and_recover(
         _LOG.info(
             "recovery: the state does not settle; pressure and traction stay constant by face"
         )
-        return state, {}
-    return found, {
-        each.zone.zone.name: RecoveredZone(
-            name=each.fit.recovery.form.name,
-            recovery=each.fit.recovery,
-            coefficients=each.fit.read(found.pressure, each.fit.coefficients(values)),
-            degree=each.fit.reconstruction.degree,
-            force=force,
-            tractions=each.tractions(values),
-        )
-        for each, force in zip(loads, forces, strict=True)
-    }
+        return state
+    fields = {}
+    for each, force in zip(loads, forces, strict=True):
+        read = each.fit.read(found.pressure, each.fit.coefficients(values))
+        fields[each.zone.zone.name] = each.fit.field(read, force, each.tractions(values))
+    return replace(found, fields=fields)

@@ -17,6 +17,7 @@ from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
 from ..scene.scene import Scene
+from .accuracy import estimate, judged, roughness, rounding
 from .compliance import compliance_of
 from .constraints import (
     ContactConstraints,
@@ -31,7 +32,7 @@ from .constraints import (
 )
 from .contact_stiffness import contact_stiffness, stiffness_of
 from .iterate import ContactIterate
-from .state import Equilibrium, estimate, judged, roughness, rounding
+from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
 

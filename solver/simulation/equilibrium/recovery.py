@@ -6,7 +6,7 @@ in full, so that means and loads are in equilibrium with the displacement.
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ...lac.reconstruction import Reconstruction
 from ...lac.recovery import Recovery, settled_means, with_status
 from ..scene.scene import ZoneScene
 from .problem import ContactProblem
-from .state import Equilibrium
+from .state import Equilibrium, PressureField
 
 _LOG = logging.getLogger(__name__)
 # Sweeps diverge where the last one changes so many times what the first did, and more than this
@@ -45,29 +45,19 @@ class ZoneFit:
         quadratic = form.degree == 2 and form.keeps_means
         return applied if quadratic else self.coefficients(pressure)
 
-
-@dataclass(frozen=True, kw_only=True)
-class RecoveredZone:
-    """A zone's reconstruction: `coefficients` (m · k,), `degree` (m,), by the form of a `name`.
-
-    `force` (n_dofs,): what its loads add to the contact forces of the means. With friction
-    `tractions` are the coefficients (m · k,) of the traction on the master, by tangent.
-    """
-
-    name: str
-    recovery: Recovery
-    coefficients: np.ndarray
-    degree: np.ndarray
-    force: np.ndarray
-    tractions: Sequence[np.ndarray] = ()
-
-    @property
-    def error(self) -> np.ndarray:
-        """The estimated L2 error (m,) of the constants."""
-        return self.recovery.error(self.coefficients)
-
-
-Recovered = dict[str, RecoveredZone]
+    def field(
+        self, coefficients: np.ndarray, force: np.ndarray, tractions: Sequence[np.ndarray] = ()
+    ) -> PressureField:
+        """The pressure of `coefficients` C (m · k,), as a result."""
+        return PressureField(
+            form=self.recovery.form.name,
+            local=self.recovery.moments.local,
+            coefficients=coefficients,
+            degree=self.reconstruction.degree,
+            error=self.recovery.error(coefficients),
+            force=force,
+            tractions=tractions,
+        )
 
 
 class _Corrected(NamedTuple):
@@ -79,17 +69,15 @@ class _Corrected(NamedTuple):
     forces: list[np.ndarray]
 
 
-def recovered(
-    problem: ContactProblem, state: Equilibrium, step: Step
-) -> tuple[Equilibrium, Recovered]:
-    """The equilibrium of a step under the recovered pressure, and this by zone.
+def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equilibrium:
+    """The equilibrium of a step under the recovered pressure, with this by zone.
 
     Where the status does not settle under the correction, the state stays as it is and no pressure
     is recovered.
     """
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
     if not given or not state.status.closed.any():
-        return state, {}
+        return state
 
     def correct(state: Equilibrium) -> _Corrected | None:
         return _corrected(problem, state, [fit_of(zone, state.status.closed) for zone in given])
@@ -105,17 +93,14 @@ def recovered(
     found = with_status(state, correct, wrong, again)
     if found is None:
         _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
-        return state, {}
-    return found.state, {
-        zone.zone.name: RecoveredZone(
-            name=fit.recovery.form.name,
-            recovery=fit.recovery,
-            coefficients=c,
-            degree=fit.reconstruction.degree,
-            force=force,
+        return state
+    fields = {
+        zone.zone.name: fit.field(coefficients, force)
+        for zone, fit, coefficients, force in zip(
+            given, found.zones, found.read, found.forces, strict=True
         )
-        for zone, fit, c, force in zip(given, found.zones, found.read, found.forces, strict=True)
     }
+    return replace(found.state, fields=fields)
 
 
 def settles(first: float, applied: np.ndarray, state: Equilibrium) -> bool:

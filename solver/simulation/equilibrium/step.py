@@ -1,11 +1,11 @@
-"""One step of a problem: its state with the law of its contact, and the recovered pressure."""
+"""One step of a problem: its state with the law of its contact and the recovered pressure."""
 
 import numpy as np
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from .problem import ContactProblem
-from .recovery import Recovered, recovered
+from .recovery import recovered
 from .state import Equilibrium
 
 
@@ -15,8 +15,8 @@ def solve_step(
     last: Equilibrium | None = None,
     start: np.ndarray | None = None,
     before: Step | None = None,
-) -> tuple[Equilibrium, Recovered]:
-    """Solve a step for its state and recovered pressure; SolveError if it has no solution.
+) -> Equilibrium:
+    """Solve a step for its state with the recovered pressure; SolveError if it has no solution.
 
     `last`: the state that friction goes on from; without friction the search for the status starts
     from `start` (k,), that of the step `before`.

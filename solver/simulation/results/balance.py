@@ -4,13 +4,12 @@ import numpy as np
 from scipy import sparse
 
 from ...lac.cells.faces import surface_nodes, surface_points
-from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.faces import face_integrals
 from ...mechanics.fem.supports import DEPENDENT
 from ...mechanics.linear.factor import factorise
 from ...mechanics.mortar.edge import Edges, contact_edges
-from ..equilibrium.recovery import RecoveredZone
-from ..equilibrium.state import Equilibrium, force_at_rest
+from ..equilibrium.accuracy import force_at_rest
+from ..equilibrium.state import Equilibrium
 from ..scene.scene import Scene, ZoneScene
 from .forces import Reaction, Resultants, RigidMotion
 
@@ -252,18 +251,12 @@ def _free_slave_rows(scene: Scene) -> sparse.csr_matrix:
     return rows[elsewhere == 0]
 
 
-def resultants(
-    scene: Scene,
-    zone: ZoneScene,
-    state: Equilibrium,
-    closed: np.ndarray,
-    field: RecoveredZone | None,
-) -> Resultants:
+def resultants(scene: Scene, zone: ZoneScene, state: Equilibrium, closed: np.ndarray) -> Resultants:
     """Area and edges of the `closed` macro-elements (m,), and the forces on the slave."""
     mean = zone.by_macro_element(state.pressure)
     edges, area = extent(scene, zone, mean, closed)
     forces = zone.forces(state.pressure)
-    if field is not None:
+    if field := state.fields.get(zone.zone.name):
         forces = forces + field.force
     nodes = surface_nodes(zone.sub_faces)
     force = forces.reshape(scene.points.shape)[nodes]
@@ -298,6 +291,6 @@ def extent(
         return edges, np.minimum(np.maximum(areas, 0.0).sum(axis=0), surface.covered.sum())
     if closed.all() or not closed.any():
         return None, np.full(3, surface.covered[closed].sum())
-    near = vertex_neighbours(faces, len(closed)).astype(int)
+    near = zone.near.astype(int)
     inside, around = closed & (near @ ~closed == 0), closed | (near @ closed > 0)
     return None, np.array([surface.covered[chosen].sum() for chosen in (closed, inside, around)])

@@ -6,7 +6,6 @@ import numpy as np
 
 from ...lac.cells.faces import surface_nodes
 from ...lac.facets import tangents_of
-from ..equilibrium.recovery import RecoveredZone
 from ..equilibrium.state import Equilibrium
 from ..scene.scene import Scene, ZoneScene
 from .balance import extent
@@ -14,7 +13,7 @@ from .forces import Resultants
 from .solution import ZoneFriction
 
 
-def zone_friction(zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None) -> ZoneFriction:
+def zone_friction(zone: ZoneScene, state: Equilibrium) -> ZoneFriction:
     """Traction, slip and status of a zone."""
     assert state.friction is not None
     tangents = tangents_of(zone.operator.surface.normal)
@@ -23,7 +22,7 @@ def zone_friction(zone: ZoneScene, state: Equilibrium, field: RecoveredZone | No
         return np.einsum("mkd,km->md", tangents, np.array([values[rows] for rows in zone.slips]))
 
     closed, recovered = state.status.closed[zone.numbers], None
-    if field is not None and len(field.tractions):
+    if (field := state.fields.get(zone.zone.name)) and len(field.tractions):
         coefficients = -np.array(field.tractions).reshape(len(zone.slips), len(closed), -1)
         recovered = np.einsum("mtd,tmk->mkd", tangents, coefficients)
     return ZoneFriction(

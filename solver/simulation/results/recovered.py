@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 
 from ...lac.cells.faces import surface_nodes
-from ..equilibrium.recovery import RecoveredZone
 from ..equilibrium.state import Equilibrium
 from ..scene.scene import Scene, ZoneScene
 from .solution import RecoveredPressure
 
 
 def recovered_pressure(
-    scene: Scene, zone: ZoneScene, state: Equilibrium, field: RecoveredZone | None
+    scene: Scene, zone: ZoneScene, state: Equilibrium
 ) -> RecoveredPressure | None:
     """The recovered pressure of a zone, and its mean at each node over the faces around."""
-    if field is None or field.name == "none":
+    field = state.fields.get(zone.zone.name)
+    if field is None or field.form == "none":
         return None
-    local, pressure = field.recovery.moments.local, state.pressure[zone.numbers]
+    local, pressure = field.local, state.pressure[zone.numbers]
     nodes = surface_nodes(zone.sub_faces)
     found = RecoveredPressure(
-        form=field.name,
+        form=field.form,
         coefficients=field.coefficients.reshape(len(pressure), -1),
         degree=field.degree,
         centre=local.centre + scene.coordinates.origin,

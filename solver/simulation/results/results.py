@@ -11,7 +11,6 @@ from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import surface_nodes, surface_normals
 from ...mechanics.fem.stress import nodal_stress, normal_stress
 from ..equilibrium.problem import ContactProblem
-from ..equilibrium.recovery import Recovered, RecoveredZone
 from ..equilibrium.state import Equilibrium
 from ..scene.bodies import body_names, meshed_cells
 from ..scene.probing import cell_at, faces_at, places_of
@@ -42,10 +41,8 @@ from .solution import (
 _HALF = 0.5 - 1e-9
 
 
-def solution_of(
-    problem: ContactProblem, states: list[Equilibrium], fields: list[Recovered], plan: list[Line]
-) -> Solution:
-    """The solution by the states of all steps, and the pressures recovered in them."""
+def solution_of(problem: ContactProblem, states: list[Equilibrium], plan: list[Line]) -> Solution:
+    """The solution by the states of all steps."""
     scene = problem.scene
     last = states[-1]
     stress = nodal_stress(
@@ -58,9 +55,9 @@ def solution_of(
     if scene.case.thin:
         stress[:, 2] = 0.0
     scale = stress_scale(scene, states, stress)
-    steps, at_nodes = step_results(scene, states, fields, scale)
+    steps, at_nodes = step_results(scene, states, scale)
     zones = [
-        _zone_result(scene, zone, last, stress, forces, fields[-1].get(zone.zone.name), steps[-1])
+        _zone_result(scene, zone, last, stress, forces, steps[-1])
         for zone, forces in zip(scene.zones, pressures_of_forces(scene, last), strict=True)
     ]
     return Solution(
@@ -138,10 +135,9 @@ def _zone_result(
     state: Equilibrium,
     stress: np.ndarray,
     pressure_of_forces: np.ndarray | None,
-    field: RecoveredZone | None,
     step: StepResult,
 ) -> ZoneResult:
-    surface = zone.operator.surface
+    surface, field = zone.operator.surface, state.fields.get(zone.zone.name)
     slave_nodes, master_nodes = surface_nodes(zone.sub_faces), surface_nodes(zone.master_faces)
     slave_normal = surface_normals(scene.points, zone.sub_faces)[slave_nodes]
     master_normal = surface_normals(scene.points, zone.master_faces)[master_nodes]
@@ -164,9 +160,9 @@ def _zone_result(
         pressure_of_forces=pressure_of_forces,
         meshed_gap=_meshed_gap(scene, zone),
         pressure_error=None if field is None else field.error,
-        recovered=recovered_pressure(scene, zone, state, field),
+        recovered=recovered_pressure(scene, zone, state),
         resultants=step.resultants[zone.zone.name],
-        friction=zone_friction(zone, state, field) if zone.slips and state.friction else None,
+        friction=zone_friction(zone, state) if zone.slips and state.friction else None,
     )
 
 
@@ -187,11 +183,11 @@ def _nodal_contact(zone: ZoneScene, state: Equilibrium) -> NodalContact | None:
 
 
 def step_results(
-    scene: Scene, states: list[Equilibrium], fields: list[Recovered], scale: float
+    scene: Scene, states: list[Equilibrium], scale: float
 ) -> tuple[list[StepResult], np.ndarray]:
     """The steps, and the reactions at nodes (n, dim) in the last one."""
     results, at_nodes = [], np.zeros(0)
-    for factor, state, field in zip(scene.case.factors, states, fields, strict=True):
+    for factor, state in zip(scene.case.factors, states, strict=True):
         seen = []
         for wanted in scene.case.observe:
             zone = next(z for z in scene.zones if z.zone.name == wanted.zone)
@@ -219,9 +215,7 @@ def step_results(
                 residual=state.residual,
                 complementarity=product / (scale * scene.coordinates.length),
                 observations=seen,
-                resultants={
-                    zone.zone.name: _resultants(scene, zone, state, field) for zone in scene.zones
-                },
+                resultants={z.zone.name: _resultants(scene, z, state) for z in scene.zones},
                 reactions=held,
                 rigid=rigid_bodies(scene, state) if scene.held.rigid else [],
                 dissipation=state.friction.dissipation if state.friction else 0.0,
@@ -230,9 +224,9 @@ def step_results(
     return results, at_nodes
 
 
-def _resultants(scene: Scene, zone: ZoneScene, state: Equilibrium, field: Recovered) -> Resultants:
+def _resultants(scene: Scene, zone: ZoneScene, state: Equilibrium) -> Resultants:
     closed = closed_of(zone, state)
-    found = resultants(scene, zone, state, closed, field.get(zone.zone.name))
+    found = resultants(scene, zone, state, closed)
     slides = zone.slips and state.friction
     return with_friction(found, scene, zone, state) if slides else found
 

@@ -15,12 +15,13 @@ from scipy import sparse
 from ...case.file import Zone
 from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import FACE_POINTS, FaceBlock, surface_normals, surface_points
+from ...lac.cells.neighbours import vertex_neighbours
 from ...lac.cut import SubFaces
 from ...lac.facets import Facets, facets, with_directions, with_master_normals, with_nodal_normals
 from ...lac.multipliers import constants
 from ...lac.operator import GapOperator, Scheme, gap_operator, without_round_off
 from ...lac.partners import face_samples
-from ...lac.reconstruction import form_of, vertex_neighbours
+from ...lac.reconstruction import form_of
 from ...lac.recovery import RecoveryRequest
 from ...mechanics.fem.supports import FreeMotion
 from ...mechanics.mortar.points import gauss

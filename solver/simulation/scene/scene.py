@@ -13,9 +13,9 @@ from ...case.acting import Step, in_step
 from ...case.file import Zone
 from ...case.model import Case
 from ...lac.cells.faces import FaceBlock
+from ...lac.cells.neighbours import vertex_neighbours
 from ...lac.cut import CutMesh, SubFaces, cut
 from ...lac.operator import GapOperator
-from ...lac.reconstruction import vertex_neighbours
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.faces import volume_cells
 from ...mechanics.fem.supports import FreeMotion

@@ -6,10 +6,11 @@ from scipy import sparse
 
 from solver.lac.cells.catalogue import BY_NAME
 from solver.lac.cells.faces import surface_points
+from solver.lac.cells.neighbours import vertex_neighbours
 from solver.lac.facets import facets
 from solver.lac.motions import rigid_motions, support_resistance, unheld_motion
 from solver.lac.operator import gap_operator
-from solver.lac.reconstruction import FORMS, vertex_neighbours
+from solver.lac.reconstruction import FORMS
 from solver.lac.recovery import RecoveryRequest
 from solver.mechanics.fem.elasticity import (
     Block,
