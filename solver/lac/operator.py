@@ -174,7 +174,7 @@ def gap_operator(
         segments=sum(len(segments.gap) for segments in found),
         closed_faces=closed,
         plain=scheme.closure and all(block.affine.all() for block in [*slaves, *masters]),
-        recovery=None if asked is None else recovery(asked, found, surface, n_nodes),
+        recovery=None if asked is None else recovery(asked, found, surface, n_nodes, scheme.slip),
         slip=slip_operator(parts, surface.normal, n_nodes) if scheme.slip else (),
         levers=levers(list(ones), surface.normal, 1) if scheme.slip else None,
     )

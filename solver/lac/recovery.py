@@ -42,14 +42,12 @@ class RecoveryRequest:
     `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
     master's faces have theirs as the number of their `Facets`. `stabilise`: makes what stabilises
     contact, if asked for, of the segments, the moments, neighbours (m, m) and covered areas (m,).
-    `slip`: tractions along the tangents are recovered too.
     """
 
     form: Form
     near: sparse.csr_matrix
     material: np.ndarray
     stabilise: Callable[..., Any] | None = None
-    slip: bool = False
 
 
 def moments(found: Sequence[Segments], surface: Surface) -> Moments:
@@ -117,9 +115,15 @@ class Recovery:
 
 
 def recovery(
-    asked: RecoveryRequest, found: Sequence[Segments], surface: Surface, n_nodes: int
+    asked: RecoveryRequest,
+    found: Sequence[Segments],
+    surface: Surface,
+    n_nodes: int,
+    slip: bool = False,
 ) -> Recovery:
     """The recovery of the pressure of macro-elements, from the segments that cover them.
+
+    `slip`: tractions along the tangents are recovered too.
 
     A slave edge from 0 to 2 under two master edges, with ψ = (1 − x) / 2: ∫ ψ N is ±1/6 at the two
     slave nodes, 1/6, 0, −1/6 at the three master nodes, and ∫ ψ² is 1/6.
@@ -145,7 +149,7 @@ def recovery(
         if form.sweeps:  # constants are not applied
             given.append((segments, psi[..., : k - (not form.keeps_means)]))
     near = _same_materials(asked, found)
-    along = tangents(surface.normal) if asked.slip else []
+    along = tangents(surface.normal) if slip else []
     stabilise, shape = asked.stabilise, (m, k, dim * n_nodes)
     return Recovery(
         form=form,
@@ -154,7 +158,7 @@ def recovery(
         loads=_loads(given, shape),
         products=products,
         slip_loads=tuple(_loads(given, shape, t) for t in along),
-        levers=levers(given, surface.normal, k) if asked.slip else None,
+        levers=levers(given, surface.normal, k) if slip else None,
         stabilisation=stabilise and stabilise(found, at, near, surface.covered),
     )
 

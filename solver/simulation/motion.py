@@ -116,14 +116,13 @@ def _in_place(
                 refuse_unfit(scene)
             with stage(clock, "assembly"):
                 carried = groups.motion - (0.0 if last is None else last.displacement)
-                problem = ContactProblem(scene, carried.ravel() if scene.case.frictional else None)
+                problem = ContactProblem(scene, carried.ravel())
         except InputError as error:
             if last is None:
                 raise
             raise SolveError(f"{error.key}: {error.problem}") from None
         with stage(clock, "solve"):
-            goes_on = _from_there(last.state) if last and scene.case.frictional else None
-            state = solve_step(problem, _STEP, goes_on)
+            state = solve_step(problem, _STEP, last.state if last else None)
         wanted, _ = predicted(rest, step, settled(groups, state.displacement, held))
         following = _followed(rest, faces, frames, wanted)
         moves = (following.turn != frames.turn).any(axis=(1, 2))
@@ -152,13 +151,6 @@ def _passed_over(points: np.ndarray, faces: list[FaceBlock]) -> float:
     edges = [points[block.nodes[:, 1]] - points[block.nodes[:, 0]] for block in faces]
     size = min((float(np.linalg.norm(e, axis=1).min()) for e in edges), default=np.inf)
     return NOTED_SLIP * size
-
-
-def _from_there(state: Equilibrium) -> Equilibrium:
-    """A state from which slips are counted anew, as the step's displacement has those before."""
-    assert state.friction is not None
-    none = np.zeros_like(state.friction.jump)
-    return replace(state, friction=replace(state.friction, jump=none, total=none))
 
 
 def _followed(rest: Attributes, faces: list[FaceBlock], old: Frames, new: Frames) -> Frames:

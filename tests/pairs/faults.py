@@ -14,7 +14,7 @@ from solver.simulation.equilibrium import problem
 from solver.simulation.judgement import validity
 from solver.simulation.results import results
 from solver.simulation.results.friction import zone_friction
-from solver.simulation.scene import operators
+from solver.simulation.scene import contact_frames, operators
 from solver.simulation.scene.parts import strain
 from solver.simulation.scene.parts.springs import Springs
 from solver.simulation.scene.parts.strain import StrainFields
@@ -134,7 +134,7 @@ FAULTS = (
         "frames-of-nodes",
         "frames of nodes whose directions are normalised one by one",
         {"interface": "curved", "friction": "held"},
-        operators,
+        contact_frames,
         "_orthonormal",
         _normalised_one_by_one,
         "solid",

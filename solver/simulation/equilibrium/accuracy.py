@@ -306,7 +306,7 @@ def judged(
         stress = iterate.sizes.stress[places // dim].max(initial=0.0)
         scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
         noise = forces + unbalanced[places].max(initial=0.0) + of_others / _ERRORS
-        for rows in (mine, *zone.slips):
+        for rows in zone.rows:
             # Of what may close: a sliver under the end of the master has no pressure to round.
             there = constraints.eligible[rows]
             acting = moving[rows][there]

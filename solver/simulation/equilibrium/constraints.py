@@ -97,7 +97,7 @@ def contact_constraints(scene: Scene, carried: np.ndarray | None = None) -> Cont
     # unknown all act, or are refused.
     active = _row_sizes(on_free) > _ACTIVE * _row_sizes(gaps)
     for zone in scene.zones:
-        for rows in (zone.numbers, *zone.slips):
+        for rows in zone.rows:
             active[rows] |= zone.treatment.cut
     slave = _slave_dofs(scene)
     free = slave & (np.diff(scene.free.basis.indptr) > 0)
@@ -217,9 +217,7 @@ def refuse_unsolvable(scene: Scene, moves: str, constraints: ContactConstraints)
 
 def _macro_elements(zone: ZoneScene, rows: np.ndarray) -> np.ndarray:
     """The macro-elements of a zone that some rows (n,) belong to."""
-    mine = [
-        rows[(rows >= r.start) & (rows < r.stop)] - r.start for r in (zone.numbers, *zone.slips)
-    ]
+    mine = [rows[(rows >= r.start) & (rows < r.stop)] - r.start for r in zone.rows]
     return np.unique(np.concatenate(mine))
 
 

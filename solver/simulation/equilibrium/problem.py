@@ -65,7 +65,7 @@ class ContactProblem:
 
         `carried` (n_dofs,): a displacement that slips count beside that of the solve.
         """
-        self.scene = scene
+        self.scene, self.moved = scene, carried is not None
         self.constraints = contact_constraints(scene, carried)
         motions = rigid_motions(scene.points, scene.body, scene.case.axisymmetric)
         self._motions = RigidMotions.of(scene, self.constraints, motions)

@@ -23,9 +23,10 @@ from ...mechanics.mortar.treatments import TREATMENTS, Treatment, merge_fixed_mu
 from ...system.progress import Clock, stage
 from ..options import LEAN, Options
 from .attributes import Attributes
+from .contact_frames import with_contact_frames
 from .cut_groups import CutZone, Surfaces, refuse_bent, surfaces_of
 from .groups import ON_AXIS, check_groups, named_parts
-from .operators import operator_of, with_contact_frames
+from .operators import operator_of
 from .parts import parts_of
 from .parts.part import ModelPart
 from .records import AtWork, Coordinates, GivenMesh, Held, Loads, Named, Unloaded
@@ -63,6 +64,11 @@ class ZoneScene:
     def numbers(self) -> slice:
         """The zone's multipliers among all."""
         return slice(self.first, self.first + len(self.operator.initial))
+
+    @property
+    def rows(self) -> tuple[slice, ...]:
+        """The multipliers, then the rows of slip by tangent."""
+        return self.numbers, *self.slips
 
     @cached_property
     def near(self) -> sparse.csr_matrix:
@@ -246,10 +252,8 @@ def scene_of(model: CutModel, groups: Attributes, clock: Clock) -> Scene:
         blocks, parts = parts_of(groups, blocks, safeguards.mixed)
         free, force = groups.supports(), groups.forces()
         zones = _zones(case, groups.zones, surfaces, operators, free)
-        slave = np.zeros(len(groups.points), dtype=bool)
-        for block in (block for zone in groups.zones for block in zone.sub_faces):
-            slave[block.nodes] = True
-        free = with_contact_frames(free, operators, slave)
+        if case.frictional:
+            free = with_contact_frames(free, operators, groups.zones)
     n_bodies = int(groups.body.max()) + 1
     n_multipliers = sum(len(z.operator.initial) for z in zones)
     return Scene(
