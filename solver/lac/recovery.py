@@ -235,6 +235,7 @@ def settled_means(
     sweeps: int,
     loads: Callable[[np.ndarray], np.ndarray],
     change: Callable[[np.ndarray], np.ndarray],
+    enough: float = 0.0,
 ) -> tuple[np.ndarray, float]:
     """The means (k,) whose reconstruction is applied in the last of the `sweeps`.
 
@@ -243,6 +244,7 @@ def settled_means(
 
     `pressure` (k,) is the one under the loads `force` (n_dofs,) of a reconstruction; `loads` gives
     those of the reconstruction of any means, `change` by how much (k,) loads change the pressure.
+    A sweep that changes them by less than the share `enough` of the largest is the last one.
 
     Here loads that are the means, and lower them by a third of their own, leave 3/4 of them:
 
@@ -255,7 +257,10 @@ def settled_means(
         following = loads(pressure)
         last = last + change(following - force)
         before, left = left, last - pressure
-        first = first if sweep else float(np.abs(left).max(initial=0.0))
+        largest = float(np.abs(left).max(initial=0.0))
+        first = first if sweep else largest
+        if largest < enough * np.abs(pressure).max(initial=0.0):
+            break
         step = _RELAXATION * left
         if sweep:
             fell = left - before

@@ -1,12 +1,14 @@
 """The recovered pressure with friction: where it slips, friction is that of the recovered pressure.
 
 The traction is q* = q + Σ c ψ on the master, as the pressure is p*. What slips has q* = −μp* d, so
-that its coefficients are −μ d times those of the pressure. What sticks has those of a
-reconstruction among macro-elements that stick: the traction has a kink where slip begins. The
-sweeps are those of `lac.recovery`; each solves for the state under the loads of the one before.
+that its coefficients are −μ d times those of the pressure. What sticks keeps those of the last
+step; what its traction changes by is reconstructed among macro-elements that stick, as it has a
+kink where slip begins. The sweeps are those of `lac.recovery`. They go on from those of the last
+step until they settle: nothing changes where loads stay the same.
 """
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +18,7 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.friction import of_tractions
-from ...lac.recovery import settled_means
+from ...lac.recovery import Recovery, settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
@@ -24,23 +26,30 @@ from .recovery import ZoneFit, fit_of, recovered, settles
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
+# So many sweeps at most, unless the case says how many, and the change of a mean, as a share of the
+# largest, that ends them: slips have a memory, so that what is left would add up over steps.
+_MOST_SWEEPS, _SETTLED = 40, 1e-11
+# Axes of macro-elements that differ by less, as a share of them, are the same.
+_TURNED = 1e-9
 
 
 @dataclass(frozen=True)
 class _Loads:
     """What the reconstruction of a zone adds, in a state of friction.
 
-    `sticks` (m,); `slide` (m, k): −μ d where it slips, d the direction of slip.
+    `sticks` (m,); `slide` (m, k): −μ d where it slips, d the direction of slip. `before`: the last
+    step's state, if what sticks keeps its tractions.
     """
 
     zone: ZoneScene
     fit: ZoneFit
     sticks: np.ndarray
     slide: np.ndarray
+    before: Equilibrium | None
 
     @classmethod
-    def of(cls, zone: ZoneScene, state: Equilibrium) -> "_Loads":
-        """Those of a state."""
+    def of(cls, zone: ZoneScene, state: Equilibrium, before: Equilibrium | None) -> "_Loads":
+        """Those of a state after another one."""
         assert state.friction is not None
         closed = state.status.closed
         slips = closed[zone.numbers] & state.friction.slipping[zone.numbers]
@@ -49,7 +58,7 @@ class _Loads:
         size = np.linalg.norm(traction, axis=1, keepdims=True)
         unit = np.divide(traction, size, out=np.zeros_like(traction), where=size > 0)
         slide = zone.zone.friction * unit * slips[:, None]
-        return cls(zone, fit_of(zone, closed), closed[zone.numbers] & ~slips, slide)
+        return cls(zone, fit_of(zone, closed), closed[zone.numbers] & ~slips, slide, before)
 
     def tractions(self, values: np.ndarray) -> list[np.ndarray]:
         """The coefficients (m · k,) of q* by tangent, for pressures and tractions of all rows."""
@@ -57,9 +66,14 @@ class _Loads:
             return []
         c = self.fit.coefficients(values).reshape(len(self.sticks), -1)
         sliding = [(slide[:, None] * c).ravel() for slide in self.slide.T]
-        stuck = self._stuck @ np.concatenate([values[rows] for rows in self.zone.slips])
-        pairs = zip(sliding, np.split(stuck, len(sliding)), strict=True)
-        return [one + other for one, other in pairs]
+        kept = [np.zeros_like(each) for each in sliding]
+        if self.before:
+            values = values - self.before.pressure
+            sticks = np.repeat(self.sticks, c.shape[1])
+            kept = [sticks * each for each in self.before.fields[self.zone.zone.name].tractions]
+        changed = self._stuck @ np.concatenate([values[rows] for rows in self.zone.slips])
+        parts = zip(sliding, kept, np.split(changed, len(sliding)), strict=True)
+        return [slides + before + change for slides, before, change in parts]
 
     @cached_property
     def _stuck(self) -> sparse.csr_matrix:
@@ -92,43 +106,80 @@ def solve_and_recover(
     Where the state does not settle under the correction, it stays as it is and no pressure is
     recovered. Raises SolveError where there is no equilibrium.
     """
-    search = Search(problem, step, before)
+    search, zones = Search(problem, step, before), problem.scene.zones
+    given = [(zone, zone.operator.recovery) for zone in zones if zone.operator.recovery]
+    sweeps, enough = max((recovery.form.sweeps for _, recovery in given), default=0), 0.0
+    if not sweeps:
+        return recovered(problem, search.settled(), step)
+    if not any(zone.zone.sweeps for zone in zones):
+        sweeps, enough = _MOST_SWEEPS, _SETTLED
+    last = before if before and _goes_on(given, before) else None
+    for start in (last, None) if last else (None,):
+        sweeping = _Sweeping(search, [zone for zone, _ in given], start)
+        try:
+            return sweeping.settled(sweeps, enough)
+        except SolveError:
+            continue
     state = search.settled()
-    given = [zone for zone in problem.scene.zones if zone.operator.recovery]
-    sweeps = max((z.operator.recovery.form.sweeps for z in given if z.operator.recovery), default=0)
-    if not sweeps or not state.status.closed.any():
-        return recovered(problem, state, step)
-    latest, under_now = state, np.zeros(state.force.size)
+    _LOG.info("recovery: the state does not settle; pressure and traction stay constant by face")
+    return state
 
-    def added(values: np.ndarray) -> np.ndarray:
-        forces = (_Loads.of(zone, latest).force(values) for zone in given)
-        return sum(forces, np.zeros(state.force.size))
 
-    def under(force: np.ndarray) -> Equilibrium:
-        return search.settled(force.reshape(state.force.shape))
+def _goes_on(given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium) -> bool:
+    """Whether all zones have a recovered pressure in a state, along the axes that they have now."""
+    for zone, recovery in given:
+        axes, field = recovery.moments.local.axes, before.fields.get(zone.zone.name)
+        if field is None or np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
+            return False
+    return True
 
-    def change(force: np.ndarray) -> np.ndarray:
-        nonlocal latest, under_now
-        under_now = under_now + force
-        before, latest = latest, under(under_now)
-        return latest.pressure - before.pressure
 
-    nothing = np.zeros(state.force.size)
-    try:
-        values, first = settled_means(state.pressure, nothing, sweeps, added, change)
-        loads = [_Loads.of(zone, latest) for zone in given]
+class _Sweeping:
+    """The sweeps of a step: each solves for the state under the loads of the one before.
+
+    They go on from the state `before`, the last step's, if it is given.
+    """
+
+    def __init__(self, search: Search, zones: Sequence[ZoneScene], before: Equilibrium | None):
+        self.search, self.zones, self.before = search, zones, before
+        self.shape = search.problem.scene.points.shape
+        self.force = np.zeros(np.prod(self.shape)) if before is None else before.correction.ravel()
+        self.state: Equilibrium
+
+    def settled(self, sweeps: int, enough: float) -> Equilibrium:
+        """The state with its recovered pressure; SolveError where the sweeps do not settle.
+
+        `enough`: see `settled_means`.
+        """
+        self.state = self._under(self.force)
+        if not self.state.status.closed.any():
+            if self.before:
+                raise SolveError("what pressed in the last step is open")
+            return self.state
+        start = self.state.pressure, self.force
+        values, first = settled_means(*start, sweeps, self._added, self._change, enough)
+        loads = [_Loads.of(zone, self.state, self.before) for zone in self.zones]
         forces = [each.force(values) for each in loads]
         couples = (each.couple(values) for each in loads)
-        found = replace(under(sum(forces, nothing)), couple=sum(couples, np.zeros(3)))
+        found = self._under(np.sum(forces, axis=0))
         if not settles(first, values, found):
             raise SolveError("the sweeps diverge")
-    except SolveError:
-        _LOG.info(
-            "recovery: the state does not settle; pressure and traction stay constant by face"
-        )
-        return state
-    fields = {}
-    for each, force in zip(loads, forces, strict=True):
-        read = each.fit.read(found.pressure, each.fit.coefficients(values))
-        fields[each.zone.zone.name] = each.fit.field(read, force, each.tractions(values))
-    return replace(found, fields=fields)
+        fields = {}
+        for each, force in zip(loads, forces, strict=True):
+            read = each.fit.read(found.pressure, each.fit.coefficients(values))
+            fields[each.zone.zone.name] = each.fit.field(read, force, each.tractions(values))
+        return replace(found, couple=sum(couples, np.zeros(3)), fields=fields)
+
+    def _under(self, force: np.ndarray) -> Equilibrium:
+        return self.search.settled(force.reshape(self.shape))
+
+    def _added(self, values: np.ndarray) -> np.ndarray:
+        """The forces (n_dofs,) of the reconstruction of pressures and tractions (k,)."""
+        loads = (_Loads.of(zone, self.state, self.before) for zone in self.zones)
+        return np.sum([each.force(values) for each in loads], axis=0)
+
+    def _change(self, force: np.ndarray) -> np.ndarray:
+        """By how much (k,) further forces (n_dofs,) change pressures and tractions."""
+        self.force = self.force + force
+        last, self.state = self.state, self._under(self.force)
+        return self.state.pressure - last.pressure
