@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from copy import deepcopy
 from random import Random
 from types import FrameType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from solver.system.errors import InputError
 
 from .cases import Case
 
-# Stresses in other units are so many times as large.
-UNITS = 1e6
+# Stresses in other units are so many times as large, lengths too.
+UNITS, LENGTHS = 1e6, 1e-3
 # Pressures and tractions are the same up to this share of the largest pressure of all steps, or so
 # many times what the solve itself says that rounding may change.
 SAME, ROUNDINGS = 1e-8, 10.0
@@ -48,44 +48,63 @@ def views(case: Case) -> Iterator[tuple[str, Case, bool]]:
     """The other views of a case: name, mapping, whether all work is done that may be left out."""
     yield "everything", case, True
     yield "other units", in_other_units(case), False
-    renumbered = deepcopy(case)
-    renumbered.setdefault("transform", {})["renumber"] = 7
-    yield "renumbered", renumbered, False
-    along = any(key in str(case) for key in ("body_force", "traction", "bodies", "together"))
-    if not along and case.get("plane") != "axisymmetric":  # what has directions along the axes
-        yield "turned", turned(case), False
+    yield "renumbered", in_another_order(case), False
+    yield "elsewhere", elsewhere(case), False
+    steps = case.get("steps", [1.0])
+    yield "last step again", case | {"steps": [*steps, steps[-1]]}, False
 
 
-def turned(case: Case) -> Case:
-    """The mesh turned by an angle of its own; supports and loads are along normals."""
+def elsewhere(case: Case) -> Case:
+    """The bodies at another place, turned by an angle of their own where nothing has directions."""
     r, dim, found = Random(case["name"]), len(case["mesh"]["bottom"]["divisions"]), deepcopy(case)
-    angle = r.uniform(10.0, 350.0)
+    angle, moves = r.uniform(10.0, 350.0), found.setdefault("transform", {})
     axis = [r.uniform(-1.0, 1.0) for _ in range(3)]
-    turn = angle if dim == 2 else {"axis": axis, "angle": angle}
-    found.setdefault("transform", {})["rotate"] = turn
+    around = case.get("plane") == "axisymmetric"
+    along = any(key in str(case) for key in ("body_force", "traction", "bodies", "together"))
+    if not along and not around:
+        moves["rotate"] = angle if dim == 2 else {"axis": axis, "angle": angle}
+    moves["translate"] = by = [r.uniform(-2.0, 2.0) * (k > 0 or not around) for k in range(dim)]
+    for plane in _planes(found):
+        plane["point"] = [x + d for x, d in zip(plane["point"], by, strict=True)]
+    return found
+
+
+def _planes(case: Case) -> list[Case]:
+    places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]
+    return [place["plane"] for place in places if "plane" in place]
+
+
+def in_another_order(case: Case) -> Case:
+    """The lists of the case from their ends, and nodes and cells of its mesh in another order."""
+    found = case | {key: case[key][::-1] for key in ("supports", "loads", "contact")}
+    found["materials"] = dict(reversed(case["materials"].items()))
+    found["transform"] = case.get("transform", {}) | {"renumber": 7}
     return found
 
 
 def in_other_units(case: Case) -> Case:
-    """The case with all stresses, forces and stiffnesses in a smaller unit."""
-    found = deepcopy(case)
-    for material in found["materials"].values():
-        material["young"] *= UNITS
-    for load in found["loads"]:
-        if "pressure" in load:
-            load["pressure"] *= UNITS
-        for key in {"traction", "body_force"} & load.keys():
-            load[key] = [UNITS * value for value in load[key]]
-    for support in found["supports"]:
-        if "spring" in support:
-            support["spring"] = {k: UNITS * value for k, value in support["spring"].items()}
-    for body in found.get("bodies", {}).values():
-        if "force" in body:
-            body["force"] = {axis: UNITS * value for axis, value in body["force"].items()}
-    return found
+    """The case with lengths, and stresses, forces and stiffnesses in smaller units."""
+    dim = len(case["mesh"]["bottom"]["divisions"])
+    units = dict.fromkeys(("fix", "move", "point", "interference", "clearance"), LENGTHS)
+    units |= dict.fromkeys(("young", "pressure", "traction"), UNITS)
+    units |= dict.fromkeys(("body_force", "spring"), UNITS / LENGTHS)
+    across = 2 if case.get("plane") == "axisymmetric" else dim - 1
+    units["force"] = UNITS * LENGTHS**across
+    same = {key: value for key, value in case.items() if key in ("mesh", "steps")}
+    scaled = {"scale": LENGTHS} | case.get("transform", {})
+    return _in_units(case, units) | same | {"transform": scaled}
 
 
-def seen(case: Case, everything: bool = False, unit: float = 1.0) -> Seen:
+def _in_units(value: Any, units: dict[str, float], unit: float = 1.0) -> Any:
+    """A value of a case with its numbers in other units, by the nearest key that has one."""
+    if isinstance(value, dict):
+        return {key: _in_units(each, units, units.get(key, unit)) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_in_units(each, units, unit) for each in value]
+    return value if unit == 1.0 or isinstance(value, str) else unit * value
+
+
+def seen(case: Case, everything: bool = False, unit: float = 1.0, length: float = 1.0) -> Seen:
     """Solve a case; only a traceback is no answer, or no end in a minute."""
     before = signal.signal(signal.SIGALRM, _too_long)
     signal.alarm(MOST_SECONDS)
@@ -99,7 +118,7 @@ def seen(case: Case, everything: bool = False, unit: float = 1.0) -> Seen:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
     causes = solved.solution.quality.accuracy.values()
-    values = solved.pressure / unit, _tractions(solved) / unit, _moved(solved)
+    values = solved.pressure / unit, _tractions(solved) / unit, _moved(solved) / length
     size = max(solved.solution.largest_pressure / unit, np.finfo(float).tiny)
     return Seen(solved.verdict, solved.reason, *values, size, max(causes, default=0.0))
 
@@ -129,7 +148,8 @@ def compared(case: Case) -> tuple[str, list[str]]:
     """The word of a case, and what differs between its views; empty where nothing does."""
     first, found = seen(case), list[str]()
     for name, other, everything in views(case) if first.word != "refused" else ():
-        again = seen(other, everything, UNITS if name == "other units" else 1.0)
+        units = (UNITS, LENGTHS) if name == "other units" else ()
+        again = seen(other, everything, *units)
         found += [f"{name}: {what}" for what in _between(first, again, name)]
     return first.word, found
 

@@ -22,13 +22,13 @@ from ...lac.recovery import Recovery, settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, recovered, settles
+from .recovery import ZoneFit, fit_of, grows, recovered
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
 # So many sweeps at most, unless the case says how many, and the change of a mean, as a share of the
 # largest, that ends them: slips have a memory, so that what is left would add up over steps.
-_MOST_SWEEPS, _SETTLED = 40, 1e-11
+_MOST_SWEEPS, _SETTLED = 40, 1e-9
 # Axes of macro-elements that differ by less, as a share of them, are the same.
 _TURNED = 1e-9
 
@@ -145,6 +145,7 @@ class _Sweeping:
         self.shape = search.problem.scene.points.shape
         self.force = np.zeros(np.prod(self.shape)) if before is None else before.correction.ravel()
         self.state: Equilibrium
+        self.first: float | None = None
 
     def settled(self, sweeps: int, enough: float) -> Equilibrium:
         """The state with its recovered pressure; SolveError where the sweeps do not settle.
@@ -157,13 +158,12 @@ class _Sweeping:
                 raise SolveError("what pressed in the last step is open")
             return self.state
         start = self.state.pressure, self.force
-        values, first = settled_means(*start, sweeps, self._added, self._change, enough)
+        values, _ = settled_means(*start, sweeps, self._added, self._change, enough)
         loads = [_Loads.of(zone, self.state, self.before) for zone in self.zones]
         forces = [each.force(values) for each in loads]
         couples = (each.couple(values) for each in loads)
         found = self._under(np.sum(forces, axis=0))
-        if not settles(first, values, found):
-            raise SolveError("the sweeps diverge")
+        self._refuse_growth(found.pressure - values, found)
         fields = {}
         for each, force in zip(loads, forces, strict=True):
             read = each.fit.read(found.pressure, each.fit.coefficients(values))
@@ -182,4 +182,13 @@ class _Sweeping:
         """By how much (k,) further forces (n_dofs,) change pressures and tractions."""
         self.force = self.force + force
         last, self.state = self.state, self._under(self.force)
-        return self.state.pressure - last.pressure
+        found = self.state.pressure - last.pressure
+        self._refuse_growth(found, self.state)
+        return found
+
+    def _refuse_growth(self, change: np.ndarray, state: Equilibrium) -> None:
+        """SolveError where a sweep changed far more than the first one."""
+        size = float(np.abs(change).max(initial=0.0))
+        self.first = size if self.first is None else self.first
+        if grows(self.first, size, state):
+            raise SolveError("the sweeps diverge")

@@ -19,8 +19,8 @@ from .problem import ContactProblem
 from .state import Equilibrium, PressureField
 
 _LOG = logging.getLogger(__name__)
-# Sweeps diverge where the last one changes so many times what the first did, and more than this
-# share of the pressure, which is rounding.
+# Sweeps diverge where one changes so many times what the first did, and more than this share of the
+# pressure, which is rounding.
 _GROWTH, _ROUNDING = 10, 1e-9
 
 
@@ -103,18 +103,16 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     return replace(found.state, fields=fields)
 
 
-def settles(first: float, applied: np.ndarray, state: Equilibrium) -> bool:
-    """Whether the last sweep changed less than the `first` one, by a margin, or than rounding.
+def grows(first: float, change: float, state: Equilibrium) -> bool:
+    """Whether a sweep that led to a state changed far more than the `first` one, and than rounding.
 
-    `applied` (k,): the pressures whose reconstruction is applied, those of the `state` are under
-    it. Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and
-    the sweeps diverge.
+    Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and the
+    sweeps diverge.
     """
-    left = np.abs(state.pressure - applied).max(initial=0.0)
     limit = state.trial.pressure_limit
     known = limit[np.isfinite(limit)].max(initial=0.0)
-    rounding = max(_ROUNDING * np.abs(applied).max(initial=0.0), known)
-    return bool(left <= max(_GROWTH * first, rounding))
+    rounding = max(_ROUNDING * np.abs(state.pressure).max(initial=0.0), known)
+    return bool(change > max(_GROWTH * first, rounding))
 
 
 def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
@@ -149,7 +147,7 @@ def _corrected(
     added = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
     correction = np.sum(added, axis=0).reshape(state.correction.shape)
     state = problem.corrected(state, correction)
-    if not settles(first, pressure, state):
+    if grows(first, float(np.abs(state.pressure - pressure).max(initial=0.0)), state):
         return None
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
     return _Corrected(state, zones, read, added)
