@@ -161,7 +161,7 @@ def find_status(
                     changes.append(int((following ^ closed).sum()))
                     closed = following
         except SolveError as error:
-            if not changes:
+            if not changes and guess is None:
                 raise
             failure = error
     return _solve_complementarity(solve, eligible, area, stiffness, changes, failure)

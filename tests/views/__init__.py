@@ -1,1 +1,1 @@
-"""Cases seen otherwise: turned, in other units, renumbered; the answer is the same."""
+"""Cases seen otherwise: elsewhere, in other units, renumbered; the answer is the same."""

@@ -28,7 +28,7 @@ from .state import Equilibrium
 _LOG = logging.getLogger(__name__)
 # So many sweeps at most, unless the case says how many, and the change of a mean, as a share of the
 # largest, that ends them: slips have a memory, so that what is left would add up over steps.
-_MOST_SWEEPS, _SETTLED = 40, 1e-9
+_MOST_SWEEPS, _SETTLED = 40, 1e-10
 # Axes of macro-elements that differ by less, as a share of them, are the same.
 _TURNED = 1e-9
 

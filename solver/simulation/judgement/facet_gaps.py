@@ -25,7 +25,8 @@ from ..scene.scene import Scene, ZoneScene
 
 # A vertex whose mean normal leans by more against a face's own is on an edge of the body.
 _EDGE = np.cos(np.radians(25))
-# Gaps of mesh and case agree where they differ by less than this share of what facets may miss.
+# Gaps of mesh and case agree where they differ by less than this share of what facets may miss;
+# bodies whose gap is smaller touch.
 _FITS = 1e-3
 # The mean over a face of what it misses, over κ R² / 2 with the κ seen at its vertices, by order:
 # 1 − |x − c|² / R² for linear lines and quadrangles (3/4 on triangles), (1 − r²) r² / 2 for arcs.
@@ -69,9 +70,8 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
             continue
         if not pushed[mine].any():
             met = zone.operator.covered > 0
-            left = state.gap[mine][met]
-            if (left > state.trial.gap_limit[mine][met]).all():
-                peak = float(missed.depth.max()) / _MEAN[1]
+            left, peak = state.gap[mine][met], float(missed.depth.max()) / _MEAN[1]
+            if (left > np.maximum(state.trial.gap_limit[mine][met], _FITS * peak)).all():
                 depth = max(depth, peak / float(left.min(initial=np.inf)))
             continue
         gaps[mine] = missed.gap
