@@ -10,9 +10,10 @@ from scipy import sparse
 
 from solver.lac import reconstruction
 from solver.lac.errors import SolveError
+from solver.lac.status import find_status
 from solver.mechanics.linear import condensation
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation.equilibrium import contact_stiffness, friction_recovery
+from solver.simulation.equilibrium import contact_stiffness, friction_recovery, problem
 from solver.simulation.equilibrium.friction import Search
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement import facet_gaps, validity
@@ -77,12 +78,18 @@ def _known(trial):
     return replace(trial, pressure_limit=0 * trial.pressure_limit)
 
 
+def without_guess(*search):
+    """A start that leaves a body free ends the search for the status."""
+    return find_status(*search[:-1], None)
+
+
 def forgotten(_given, _before):
     """A recovered pressure with friction does not go on from the last step."""
     return False
 
 
 PLANTED = {
+    "left": (problem, "find_status", without_guess),
     "memory": (friction_recovery, "_goes_on", forgotten),
     "shrunk": (validity, "facets_of", by_rounding(facet_gaps.facets_of)),
     "frames": (friction_recovery, "of_tractions", frames_apart),

@@ -63,7 +63,8 @@ class ContactProblem:
     def __init__(self, scene: Scene, carried: np.ndarray | None = None):
         """Assemble; raises InputError where nothing can hold a body or a macro-element's node.
 
-        `carried` (n_dofs,): a displacement that slips count beside that of the solve.
+        `carried` (n_dofs,): a displacement that slips count beside that of the solve, from where
+        the last step left the bodies, which have `moved` since.
         """
         self.scene, self.moved = scene, carried is not None
         self.constraints = contact_constraints(scene, carried)
