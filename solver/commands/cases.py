@@ -71,7 +71,7 @@ def _refusals(path: Path, with_mesh: bool) -> Iterator[InputError]:
 
             read_recipe(case.mesh.source, path)
         if with_mesh:
-            from ..simulation.fit import refusals_on
+            from ..simulation.simulate import refusals_on
             from ..verification.run import mesh_of
 
             mesh, told = mesh_of(case), set()

@@ -8,18 +8,13 @@ names all.
 
 from collections.abc import Iterator
 
-import meshio
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..case.model import Case
 from ..system.errors import InputError
-from ..system.progress import Clock
-from .equilibrium.problem import ContactProblem
-from .options import LEAN
-from .scene.bodies import ONE_PLACE, bodies_of, body_names, without_unloaded
+from .scene.bodies import ONE_PLACE, bodies_of, body_names
 from .scene.probing import cell_at, faces_at
-from .scene.scene import Scene, ZoneScene, build_model, build_scene
+from .scene.scene import Scene, ZoneScene
 
 # Bodies that overlap by more than this share of the smaller one are no problem of small strain.
 _DEEPEST = 0.1
@@ -29,24 +24,6 @@ def refuse_unfit(scene: Scene) -> None:
     """Raise the first refusal."""
     for error in refusals(scene):
         raise error
-
-
-def refusals_on(case: Case, mesh: meshio.Mesh) -> Iterator[InputError]:
-    """All refusals of a case on its mesh, from the first group that is missing on.
-
-    Bodies that move may meet only where the first step brings them.
-    """
-    try:
-        if case.moving:
-            build_model(case, mesh, LEAN, Clock())
-            return
-        scene = build_scene(case, mesh)
-        found = list(refusals(scene))
-        yield from found
-        if not found:
-            ContactProblem(without_unloaded(scene))
-    except InputError as error:
-        yield error
 
 
 def refusals(scene: Scene) -> Iterator[InputError]:

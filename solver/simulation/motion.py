@@ -73,11 +73,8 @@ def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) 
     Where a later step has no solution, those before it are kept. Raises InputError where the case
     and its mesh do not fit, SolveError where the first step has no solution.
     """
-    model = build_model(case, mesh, options, clock)
-    at_work = AtWork.of(model.groups.forces(), model.groups.supports().offset)
-    model = replace(model, at_work=at_work)
-    dim = model.groups.points.shape[1]
-    frames, last, rounds = Frames.still(int(model.groups.body.max()) + 1, dim), None, 0
+    model, frames = _at_rest(case, mesh, options, clock)
+    last, rounds = None, 0
     found, ended = list[Solution](), ""
     for factor, step in zip(case.factors, case.steps, strict=True):
         try:
@@ -97,6 +94,28 @@ def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) 
     why = "pairs and intersections belong to the mesh where the bodies are"
     whole.plan.append(Line(f"bodies followed, up to {rounds} rounds a step", why))
     return finished(whole, clock, ended)
+
+
+def first_scene(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> Scene:
+    """The scene of the first step, where it is expected to bring the bodies.
+
+    Raises InputError where the case and its mesh do not fit.
+    """
+    model, frames = _at_rest(case, mesh, options, clock)
+    rest, step = model.groups, case.steps[0]
+    wanted, _ = predicted(rest, step, frames)
+    frames = _followed(rest, model.contact_faces, frames, wanted)
+    return scene_of(model, Moved(rest, model.contact_faces, step, frames, wanted), clock)
+
+
+def _at_rest(
+    case: Case, mesh: meshio.Mesh, options: Options, clock: Clock
+) -> tuple[CutModel, Frames]:
+    """The model, with what acts in all steps, and the frames of its bodies before any step."""
+    model = build_model(case, mesh, options, clock)
+    at_work = AtWork.of(model.groups.forces(), model.groups.supports().offset)
+    still = Frames.still(int(model.groups.body.max()) + 1, model.groups.points.shape[1])
+    return replace(model, at_work=at_work), still
 
 
 def _in_place(

@@ -1,18 +1,20 @@
 """Solve a case on a mesh: from case and mesh to a Solution."""
 
 import logging
+from collections.abc import Iterator
 from dataclasses import replace
 
 import meshio
 
 from ..case.model import Case
 from ..lac.errors import SolveError
+from ..system.errors import InputError
 from ..system.progress import OUTCOME, Clock, processor_time, stage
 from .equilibrium.problem import ContactProblem
 from .equilibrium.state import Equilibrium
 from .equilibrium.step import solve_step
 from .finished import called, finished, tell
-from .fit import refuse_unfit
+from .fit import refusals, refuse_unfit
 from .judgement.plan import decided, plan_notes
 from .judgement.validity import validity
 from .options import LEAN, Options
@@ -86,6 +88,26 @@ def solve_problem(problem: ContactProblem, clock: Clock) -> Solution:
         solution = solution_of(problem, states, plan)
         solution.quality.validity = validity(problem, states)
     return finished(solution, clock, ended)
+
+
+def refusals_on(case: Case, mesh: meshio.Mesh) -> Iterator[InputError]:
+    """All refusals of a case on its mesh, from the first group that is missing on.
+
+    Bodies that move are where the first step is expected to bring them.
+    """
+    try:
+        if case.moving:
+            from .motion import first_scene
+
+            scene = first_scene(case, mesh, LEAN, Clock())
+        else:
+            scene = build_scene(case, mesh)
+        found = list(refusals(scene))
+        yield from found
+        if not found:
+            ContactProblem(without_unloaded(scene))
+    except InputError as error:
+        yield error
 
 
 def assembled(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -> ContactProblem:

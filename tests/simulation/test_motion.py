@@ -15,7 +15,7 @@ from solver.mesh import generate
 from solver.simulation.motion import _joined, _position
 from solver.simulation.options import LEAN
 from solver.simulation.scene.parts.springs import springs_of
-from solver.simulation.simulate import simulate, solved
+from solver.simulation.simulate import refusals_on, simulate, solved
 from solver.system.errors import InputError
 from solver.system.progress import Clock
 from solver.verification.run import mesh_of
@@ -301,6 +301,16 @@ def test_what_slid_off_ends_the_path_and_keeps_the_steps_before():
     assert len(solution.steps) == 1
     with pytest.raises(SolveError, match="step 2"):
         simulate(case, generate(MESH, "moving"))
+
+
+def test_what_the_first_step_makes_impossible_is_told_without_solving():
+    """Pulled 60 to the side, the block lies over nothing; as meshed it lies on the other one."""
+    gone = moving(steps=[{"press": 1, "pull": 60 / 7}])
+    told = [str(error) for error in refusals_on(gone, mesh_of(gone))]
+    with pytest.raises(InputError) as refused:
+        run(gone)
+    assert told == [str(refused.value)]
+    assert not list(refusals_on(moving(), mesh_of(moving())))
 
 
 def test_small_motion_is_that_of_linear_theory():

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from solver.case.reader import parse_case
-from solver.simulation.fit import refusals_on
-from solver.simulation.simulate import simulate
+from solver.simulation.simulate import refusals_on, simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.results import read_result, write_result
