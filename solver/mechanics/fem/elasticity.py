@@ -149,9 +149,9 @@ def by_part(
     return prefetch(lambda part: (part, found(part)), chunks(block, dim))
 
 
-def _parts(block: Block, size: int, together: int) -> Iterator[slice]:
-    """Parts of a block's cells that need `together` bytes, one cell `size` bytes."""
-    step = max(1, together // size)
+def _parts(block: Block, size: int, limit: int) -> Iterator[slice]:
+    """Parts of a block's cells that need `limit` bytes at most, one cell `size` bytes."""
+    step = max(1, limit // size)
     for start in range(0, len(block.cells), step):
         yield slice(start, start + step)
 

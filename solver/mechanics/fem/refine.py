@@ -107,8 +107,8 @@ def _keys(kind: CellType, reference: np.ndarray, random: np.ndarray) -> np.ndarr
     64 bits for all weights: sums of powers of two alone would leave the low bits zero.
     """
     first, second, shift = _MIX
-    mixed = _weights(kind, reference).astype(np.uint64) * first
-    return random @ ((mixed ^ (mixed >> shift)) * second).T
+    spread = _weights(kind, reference).astype(np.uint64) * first
+    return random @ ((spread ^ (spread >> shift)) * second).T
 
 
 class _Children:

@@ -277,7 +277,7 @@ class Systems:
             else:
                 system = condense(matrix, constraints, own, by)
             self._kept[number] = mine.tobytes(), system
-        self.latest = self._kept[0][1] if len(self._parts) == 1 else self._together(closed)
+        self.latest = self._kept[0][1] if len(self._parts) == 1 else self._joined(closed)
         return self.latest
 
     def _of(
@@ -291,7 +291,7 @@ class Systems:
         matrix = self._matrix.tocsr()[chosen][:, chosen]
         return matrix, constraints[:, chosen], None if own is None else own[chosen]
 
-    def _together(self, closed: np.ndarray) -> "IndependentSystems":
+    def _joined(self, closed: np.ndarray) -> "IndependentSystems":
         """The systems of all parts as one."""
         kept = [self._kept[number][1] for number in range(len(self._parts))]
         largest = kept[int(np.argmax([part.unknowns.sum() for part in self._parts]))]

@@ -226,8 +226,8 @@ def _holding(scene: Scene) -> str:
     slaves = [f.nodes.ravel() for zone in scene.zones for f in zone.sub_faces]
     dim = scene.points.shape[1]
     basis = scene.free.basis.tocsc()
-    tied = np.repeat(np.diff(basis.indptr) > dim, np.diff(basis.indptr))
-    if np.isin(basis.indices[tied] // dim, np.concatenate(slaves)).any():
+    several = np.repeat(np.diff(basis.indptr) > dim, np.diff(basis.indptr))
+    if np.isin(basis.indices[several] // dim, np.concatenate(slaves)).any():
         return (
             "their nodes move together; name the other surface as slave (solve --swap), or tie the "
             "other side of the body"

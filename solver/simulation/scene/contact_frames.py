@@ -37,9 +37,9 @@ def with_contact_frames(
         nodes, coefficients = _own(operator, alone)
         size = np.abs(coefficients)
         there = size > _ROUND_OFF * size.max(axis=(1, 2), keepdims=True)
-        mixed = (there.sum(axis=2) > 1).any(axis=1)
-        turned.append(nodes[mixed])
-        frames.append(_orthonormal(coefficients[mixed]))
+        several = (there.sum(axis=2) > 1).any(axis=1)
+        turned.append(nodes[several])
+        frames.append(_orthonormal(coefficients[several]))
     nodes = np.concatenate(turned)
     if not len(nodes):
         return free

@@ -249,7 +249,7 @@ def scene_of(model: CutModel, groups: Attributes, clock: Clock) -> Scene:
         ]
     with stage(clock, "assembly"):
         blocks = groups.elasticity(options.shortcuts.quadrature)
-        blocks, parts = parts_of(groups, blocks, safeguards.mixed)
+        blocks, parts = parts_of(groups, blocks, safeguards)
         free, force = groups.supports(), groups.forces()
         zones = _zones(case, groups.zones, surfaces, operators, free)
         if case.frictional:

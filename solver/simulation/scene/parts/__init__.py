@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ....mechanics.fem.block import Block
+from ...options import Safeguards
 from .part import ModelPart
 
 if TYPE_CHECKING:
@@ -23,12 +24,9 @@ if TYPE_CHECKING:
 
 
 def parts_of(
-    groups: Attributes, blocks: list[Block], in_mixed_form: bool = True
+    groups: Attributes, blocks: list[Block], safeguards: Safeguards
 ) -> tuple[list[Block], tuple[ModelPart, ...]]:
-    """The elastic blocks of cells that are left, and the parts that the case asks for.
-
-    Without `in_mixed_form` no cell is, whatever the case says.
-    """
+    """The elastic blocks of cells that are left, and the parts that the case asks for."""
     case, parts, strain = groups.case, list[ModelPart](), None
     if any(support.spring for support in case.supports):
         from .springs import springs_of
@@ -38,7 +36,7 @@ def parts_of(
         from .strain import StrainFields
 
         strain = StrainFields(groups)
-    if in_mixed_form and any(material.mixed for material in case.materials.values()):
+    if safeguards.mixed and any(material.mixed for material in case.materials.values()):
         from .mixed import split_off
 
         blocks, part = split_off(groups, blocks, strain)
