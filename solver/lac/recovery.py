@@ -40,14 +40,15 @@ class RecoveryRequest:
     """The form of a recovery on m macro-elements.
 
     `near` (m, m): which share a vertex; `material` (m,): a number of that of the slave's cells. The
-    master's faces have theirs as the number of their `Facets`. `stabilise`: makes what stabilises
-    contact, if asked for, of the segments, the moments, neighbours (m, m) and covered areas (m,).
+    master's faces have theirs as the number of their `Facets`. `compliance`: makes what contact
+    gives way by, if asked for, of the segments, the moments, neighbours (m, m) and covered areas
+    (m,).
     """
 
     form: Form
     near: sparse.csr_matrix
     material: np.ndarray
-    stabilise: Callable[..., Any] | None = None
+    compliance: Callable[..., Any] | None = None
 
 
 def moments(found: Sequence[Segments], surface: Surface) -> Moments:
@@ -90,7 +91,8 @@ class Recovery:
 
     `near` (m, m): which of them may be neighbours; `loads` (m · k, n_dofs): ∫ ψ (N_master −
     N_slave) n dS, none for a constant ψ; `slip_loads`: the same with each tangent in place of n,
-    `levers` their couples (see `tangential.levers`); `products` (m, k, k): ∫ ψ ψᵀ dS.
+    `levers` their couples (see `friction.levers`); `products` (m, k, k): ∫ ψ ψᵀ dS; `compliance`:
+    what contact gives way by, if asked for.
     """
 
     form: Form
@@ -98,7 +100,7 @@ class Recovery:
     near: sparse.csr_matrix
     loads: sparse.csr_matrix
     products: np.ndarray
-    stabilisation: Any = None
+    compliance: Any = None
     slip_loads: tuple[sparse.csr_matrix, ...] = ()
     levers: np.ndarray | None = None
 
@@ -150,7 +152,7 @@ def recovery(
             given.append((segments, psi[..., : k - (not form.keeps_means)]))
     near = _same_materials(asked, found)
     along = tangents(surface.normal) if slip else []
-    stabilise, shape = asked.stabilise, (m, k, dim * n_nodes)
+    compliance, shape = asked.compliance, (m, k, dim * n_nodes)
     return Recovery(
         form=form,
         moments=at,
@@ -159,7 +161,7 @@ def recovery(
         products=products,
         slip_loads=tuple(_loads(given, shape, t) for t in along),
         levers=levers(given, surface.normal, k) if slip else None,
-        stabilisation=stabilise and stabilise(found, at, near, surface.covered),
+        compliance=compliance and compliance(found, at, near, surface.covered),
     )
 
 

@@ -76,7 +76,7 @@ def _remedies(solution: Solution, zone: Zone, result: ZoneResult) -> str:
     lac, cells = zone.treatment == "lac", {c for b in solution.bodies for c in b.cells}
     admitted = {
         "exchange slave and master": solution.deformable[result.master_nodes].any(),
-        "set `stabilised: true`": lac and not zone.friction and not zone.stabilised,
+        "set `stabilised: true`": lac and not zone.friction and not zone.gives_way,
         "cut with `hexahedra: hexahedra`": lac
         and zone.hexahedra != "hexahedra"
         and bool(cells & ({"HEXA8", "HEXA20"} if result.flat else {"HEXA8"})),  # bent: refused

@@ -1,4 +1,4 @@
-"""Stabilised contact gives way to pressures that scatter (docs/slave-and-master.md)."""
+"""Contact gives way to pressures that scatter (docs/slave-and-master.md#stabilised-contact)."""
 
 import numpy as np
 from scipy import sparse
@@ -16,10 +16,10 @@ def compliance_of(scene: Scene, normal: np.ndarray, closed: np.ndarray) -> Compl
     parts, weight = [], [np.empty(0)]
     for zone in scene.zones:
         mine, recovery = closed[zone.numbers], zone.operator.recovery
-        if zone.zone.stabilised and recovery and recovery.stabilisation:
+        if recovery and recovery.compliance:
             area = zone.operator.area[mine]
-            parts.append(sparse.diags(area) @ recovery.stabilisation.scatter(mine))
-            weight.append(recovery.stabilisation.weight[mine] / area**2)
+            parts.append(sparse.diags(area) @ recovery.compliance.scatter(mine))
+            weight.append(recovery.compliance.weight[mine] / area**2)
         else:
             parts.append(sparse.csr_matrix((0, int(mine.sum()))))
     parts.append(sparse.csr_matrix((0, int(closed[~normal].sum()))))

@@ -138,7 +138,7 @@ def estimated(solution: Solution) -> Iterator[Line]:
 def softness_notes(solution: Solution) -> Iterator[Line]:
     """A note where contact gives way to pressures that scatter."""
     for given, zone in zip(solution.case.zones, solution.zones, strict=True):
-        if given.stabilised:
+        if given.gives_way:
             largest = float(np.abs(zone.gap[zone.closed]).max(initial=0.0))
             what = f"{zone.name}: stabilised, average gaps of up to {largest:.1e} in contact"
             yield Line(

@@ -111,11 +111,11 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> R
     form = form_of(zone.recovery, order, corners)
     if form.sweeps and zone.sweeps:
         form = replace(form, sweeps=zone.sweeps)
-    stabilise = None
+    compliance = None
     if zone.stabilised:
         softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
-        stabilise = partial(stabilisation, soft_of=(softness[material], softness))
-    return RecoveryRequest(form, vertex_neighbours(vertices, count), material, stabilise)
+        compliance = partial(stabilisation, soft_of=(softness[material], softness))
+    return RecoveryRequest(form, vertex_neighbours(vertices, count), material, compliance)
 
 
 def _as_bent(block: Facets) -> Facets:
