@@ -166,6 +166,11 @@ class Case:
         return any(zone.friction for zone in self.zones)
 
     @property
+    def surfaces(self) -> dict[str, str]:
+        """The kind of each surface that stands in place of a mesh, by the name of its body."""
+        return {name: body.surface for name, body in self.rigid.items() if body.surface}
+
+    @property
     def job(self) -> str:
         """The name of this solve, as of its folder and its file of accepted values."""
         return self.solved_as.job(self.name)

@@ -250,7 +250,7 @@ def _refuse_surfaces(scene: Scene, touching: np.ndarray) -> None:
                     f"covers at most {worst:.1e} of a slave face of {slave}: do both bodies have "
                     "the same unit of length?"
                 )
-            elif (body := scene.case.rigid.get(master)) and body.surface == "plane":
+            elif scene.case.surfaces.get(master) == "plane":
                 allowed += "; the normal of a rigid plane points out of the body"
             raise InputError(scene.case.path, key, master, allowed)
 

@@ -98,12 +98,12 @@ class _Missed(NamedTuple):
 
 def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
     """What the facets of a zone miss; None where they miss nothing, or both sides the same."""
-    operator, body = zone.operator, scene.case.rigid.get(zone.zone.master)
+    operator = zone.operator
     if zone.zone.clearance is not None or operator.nodes is not None or not zone.master_faces:
         return None
     slave = _bend(scene.points, zone.slave_faces)
     rise, depth = slave.rise, np.abs(slave.rise)
-    if body is None or not body.surface:
+    if zone.zone.master not in scene.case.surfaces:
         master = _bend(scene.points, zone.master_faces)
         _, near = cKDTree(master.middle).query(slave.middle)
         rise, depth = rise + master.rise[near], depth + np.abs(master.rise[near])

@@ -186,7 +186,7 @@ def _apart(scene: Scene) -> np.ndarray:
 
 def meshed(scene: Scene) -> dict[str, np.ndarray]:
     """The cells by type, without those that carry the motion of a surface given by the case."""
-    hidden = [scene.given.groups[name] for name, body in scene.case.rigid.items() if body.surface]
+    hidden = [scene.given.groups[name] for name in scene.case.surfaces]
     kept = {}
     for kind, cells in scene.mesh.cells.items():
         parts = [scene.mesh.members(kind, group) for group in hidden]
@@ -197,7 +197,7 @@ def meshed(scene: Scene) -> dict[str, np.ndarray]:
 def _turn(scene: Scene, moved: np.ndarray) -> float:
     """The largest rotation of a rigid body, in radians."""
     found = [0.0]
-    for frame in scene.held.rigid.values():
+    for frame in scene.held.frames.values():
         amount = frame.amount(moved[frame.nodes])
         found.append(float(np.linalg.norm([amount.get(key, 0.0) for key in ("rx", "ry", "rz")])))
     return max(found)
@@ -205,8 +205,7 @@ def _turn(scene: Scene, moved: np.ndarray) -> float:
 
 def _bent(zone: ZoneScene, scene: Scene) -> bool:
     """Whether sliding changes what a zone takes for granted: a rigid plane is the same all over."""
-    body = scene.case.rigid.get(zone.zone.master)
-    return body is None or body.surface != "plane"
+    return scene.case.surfaces.get(zone.zone.master) != "plane"
 
 
 def _slip(scene: Scene, zone: ZoneScene, moved: np.ndarray, closed: np.ndarray) -> float:

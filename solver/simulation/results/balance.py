@@ -110,7 +110,7 @@ def _contact(scene: Scene, state: Equilibrium) -> np.ndarray:
 def rigid_bodies(scene: Scene, state: Equilibrium) -> list[RigidMotion]:
     """The motion of each rigid body, and the contact force on it."""
     contact, found = _contact(scene, state), []
-    for name, frame in scene.held.rigid.items():
+    for name, frame in scene.held.frames.items():
         moved = frame.amount(state.displacement[frame.nodes])
         force = frame.resultant(contact[frame.nodes])
         axes = "xyz"[: contact.shape[1]]

@@ -217,7 +217,7 @@ def step_results(
                 observations=seen,
                 resultants={z.zone.name: _resultants(scene, z, state) for z in scene.zones},
                 reactions=held,
-                rigid=rigid_bodies(scene, state) if scene.held.rigid else [],
+                rigid=rigid_bodies(scene, state) if scene.held.frames else [],
                 dissipation=state.friction.dissipation if state.friction else 0.0,
             )
         )

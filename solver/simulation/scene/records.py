@@ -49,10 +49,10 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class Held:
-    """The displacements that are `fixed`, and the `rigid` bodies by name."""
+    """The displacements that are `fixed`, and the `frames` of rigid bodies by name."""
 
     fixed: list[Fixed]
-    rigid: dict[str, Frame]
+    frames: dict[str, Frame]
 
 
 @dataclass(frozen=True)
