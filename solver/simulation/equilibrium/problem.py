@@ -17,7 +17,7 @@ from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
 from ..scene.scene import Scene
-from .accuracy import estimate, judged, roughness, rounding
+from .accuracy import AT_REST, estimate, judged, roughness, rounding
 from .compliance import compliance_of
 from .constraints import (
     ContactConstraints,
@@ -42,6 +42,9 @@ _EXTEND = 3e-11
 _CHANGE = 1e-4
 # The residual of a corrected state may be so many times what is otherwise taken for round-off.
 _CORRECTED = 4.0
+# A body that is moved, and hardly strained: below this share of what its motion would bring up
+# where it is imposed, the forces that are left are the scale, and it is solved once more.
+_MOVED = 1e-3
 # A share of the loads: what contact pressure may leave of them on free rigid motions.
 _BALANCED = 1e-9
 SINGLE_FROM = 1_000_000
@@ -316,6 +319,10 @@ class ContactProblem:
                 # Nothing holds the first stiffness while the second is made.
                 del system, self.matrix, self._systems
                 self._assemble()
+                continue
+            works = _force_scale(iterate)
+            if refine and AT_REST * scale < works < _MOVED * scale:
+                start, scale = iterate, works
                 continue
             pressure = np.zeros(len(start.closed))
             pressure[start.closed] = multiplier
