@@ -167,7 +167,7 @@ class Case:
 
     @property
     def surfaces(self) -> dict[str, str]:
-        """The kind of each surface that stands in place of a mesh, by the name of its body."""
+        """The kind of each rigid surface that has no mesh of its own, by body name."""
         return {name: body.surface for name, body in self.rigid.items() if body.surface}
 
     @property

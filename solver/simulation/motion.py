@@ -73,7 +73,7 @@ def solve_moving(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) 
     Where a later step has no solution, those before it are kept. Raises InputError where the case
     and its mesh do not fit, SolveError where the first step has no solution.
     """
-    model, frames = _at_rest(case, mesh, options, clock)
+    model, frames = _unmoved(case, mesh, options, clock)
     last, rounds = None, 0
     found, ended = list[Solution](), ""
     for factor, step in zip(case.factors, case.steps, strict=True):
@@ -101,14 +101,12 @@ def first_scene(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -
 
     Raises InputError where the case and its mesh do not fit.
     """
-    model, frames = _at_rest(case, mesh, options, clock)
-    rest, step = model.groups, case.steps[0]
-    wanted, _ = predicted(rest, step, frames)
-    frames = _followed(rest, model.contact_faces, frames, wanted)
-    return scene_of(model, Moved(rest, model.contact_faces, step, frames, wanted), clock)
+    model, frames = _unmoved(case, mesh, options, clock)
+    groups, _ = _expected(model, case.steps[0], frames)
+    return scene_of(model, groups, clock)
 
 
-def _at_rest(
+def _unmoved(
     case: Case, mesh: meshio.Mesh, options: Options, clock: Clock
 ) -> tuple[CutModel, Frames]:
     """The model, with what acts in all steps, and the frames of its bodies before any step."""
@@ -118,17 +116,22 @@ def _at_rest(
     return replace(model, at_work=at_work), still
 
 
-def _in_place(
-    model: CutModel, step: Step, frames: Frames, last: _Place | None, clock: Clock
-) -> _Solved:
-    """A step solved where its bodies are; SolveError where it has no solution or no place."""
+def _expected(model: CutModel, step: Step, frames: Frames) -> tuple[Moved, np.ndarray]:
+    """The groups where a step is expected to bring the bodies, and which of these are held."""
     rest, faces = model.groups, model.contact_faces
     if exact := rest.case.exact_in(step):
         rest = rest.with_solution(exact)
     wanted, held = predicted(rest, step, frames)
-    frames = _followed(rest, faces, frames, wanted)
+    return Moved(rest, faces, step, _followed(rest, faces, frames, wanted), wanted), held
+
+
+def _in_place(
+    model: CutModel, step: Step, frames: Frames, last: _Place | None, clock: Clock
+) -> _Solved:
+    """A step solved where its bodies are; SolveError where it has no solution or no place."""
+    groups, held = _expected(model, step, frames)
+    rest, faces, frames = groups.rest, model.contact_faces, groups.frames_of_bodies
     for count in range(1, _ROUNDS + 1):
-        groups = Moved(rest, faces, step, frames, wanted)
         try:
             scene = scene_of(replace(model, rounding=_rounding(model, groups)), groups, clock)
             if last is None:
@@ -149,7 +152,7 @@ def _in_place(
         _LOG.info("round %d: %d bodies went on", count, moves.sum())
         if not moves.any():
             return _Solved(_Place(groups, state), problem, count)
-        frames = following
+        frames, groups = following, Moved(rest, faces, step, following, wanted)
     raise SolveError(f"{body_names(scene)[int(moves.argmax())]} finds no place: it still moves")
 
 

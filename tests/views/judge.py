@@ -148,8 +148,8 @@ def compared(case: Case) -> tuple[str, list[str]]:
     """The word of a case, and what differs between its views; empty where nothing does."""
     first, found = seen(case), list[str]()
     for name, other, everything in views(case) if first.word != "refused" else ():
-        units = (UNITS, LENGTHS) if name == "other units" else ()
-        again = seen(other, everything, *units)
+        unit, length = (UNITS, LENGTHS) if name == "other units" else (1.0, 1.0)
+        again = seen(other, everything, unit, length)
         found += [f"{name}: {what}" for what in _between(first, again, name)]
     return first.word, found
 

@@ -292,8 +292,8 @@ def judged(
     """Pressure (k,) and gap of an iterate with what is round-off of each, zone by zone.
 
     The scale of pressures is the largest stress or pressure at the zone's own surfaces, the scale
-    of a gap the size of the displacements that open it. Bodies that no support holds
-    hand on what rounding leaves of their resultants: a zone that bears no more bears nothing.
+    of a gap the size of the displacements that open it. Bodies that no support holds hand on what
+    rounding leaves of their resultants: a zone that bears no more than that bears nothing.
     """
     scene, constraints, dim = iterate.scene, iterate.constraints, iterate.scene.points.shape[1]
     left = iterate.residual() + constraints.on_free.T @ pressure
@@ -302,7 +302,7 @@ def judged(
     moving, limit = constraints.moving, np.zeros(len(pressure))
     of_others = AT_REST * _at_rest(iterate)
     loose = np.diff(iterate.displacement.motions.indptr) > 0
-    handed_on = float(np.linalg.norm(forces[loose]))
+    handed_on = np.full_like(forces, np.linalg.norm(forces[loose]))
     for zone in scene.zones:
         mine = zone.numbers
         places = constraints.gaps[mine].indices
@@ -316,10 +316,10 @@ def judged(
             error = pressure_of_forces(acting, noise)
             error += pressure_of_gaps(acting, known[rows][there], diagonal)
             limit[rows] = _NOISE * scale + _ERRORS * error
-            least = loose[places].any() * handed_on * _ERRORS
-            least = pressure_of_forces(acting, np.full_like(noise, least))
-            if np.abs(pressure[rows]).max(initial=0.0) <= least:
-                limit[rows] = np.maximum(limit[rows], least)
+            if loose[places].any():
+                least = _ERRORS * pressure_of_forces(acting, handed_on)
+                if np.abs(pressure[rows]).max(initial=0.0) <= least:
+                    limit[rows] = np.maximum(limit[rows], least)
     motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)
     covered = np.where(constraints.eligible, constraints.covered, np.inf)
     return Trial(

@@ -42,7 +42,8 @@ class Search:
         self.rows = np.array([np.concatenate([numbers[r] for r in rows]) for rows in by_tangent])
         counts = [len(zone.operator.initial) for zone in zones]
         self.coefficient = np.repeat([zone.zone.friction for zone in zones], counts)
-        # Slip is what the jumps have more than those of the last step: none, as bodies have moved.
+        # Slip is what the jumps have more than those of the last step. Where bodies have moved,
+        # jumps are counted from where that step left them.
         last = before.friction if before and not problem.moved else None
         self.jump = last.jump if last else np.zeros(len(numbers))
         self.total = last.total if last else np.zeros(len(numbers))

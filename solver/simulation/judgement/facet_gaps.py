@@ -56,8 +56,8 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     """What facets do to a state, its status kept.
 
     Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
-    nodes. A pressure below its round-off is none. The elastic closing is twice the strain energy
-    over ∫ p, the largest it can be.
+    nodes. A pressure below its round-off limit counts as zero. The elastic closing is twice the
+    strain energy over ∫ p, the largest it can be.
     """
     scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
     presses = state.pressure > state.trial.pressure_limit
