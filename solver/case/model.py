@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from msgspec import structs
 
 from .acting import Load, Probe, Step, Support
+from .expressions import EXACT
 from .file import Observation, Zone
 from .material import Material
 from .rigid import Rigid
@@ -202,6 +203,12 @@ class Case:
         if exact is None or not self.moving:
             return self
         return self.with_exact(exact.moved(self._way(self.steps[-1])))
+
+    @property
+    def exact_contact(self) -> "ExactSolution | None":
+        """The exact solution where its contact is that of every zone: of one, or so it is said."""
+        every = self.reference.values.get("contact_pressure") is EXACT
+        return self.reference.exact if every or len(self.zones) == 1 else None
 
     def with_exact(self, exact: "ExactSolution | None") -> "Case":
         """The case with another exact solution."""

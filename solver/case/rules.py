@@ -17,7 +17,9 @@ from .rigid import Rigid
 Fault = tuple[str, object, str]
 # Keys of the reference that need contact.
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
-# Those that need friction.
+# What an exact solution has of bodies, not of contact.
+_OF_FIELDS = {"displacement", "gradient", "stress"}
+# Keys that need friction.
 _OF_FRICTION = {"friction_traction", "slip", "stick_area", "dissipation"}
 # Treatments with fewer multipliers than nodes of the slave where two sides move as one.
 _CYCLIC = "lac", "quadrature"
@@ -156,6 +158,9 @@ def _in_errors(case: Case) -> Iterator[Fault]:
             yield key, value, "needs an exact solution: reference.solution names none"
         elif BY_NAME[error].needs not in reference.exact.quantities:
             yield key, value, f"{reference.exact.name} has no {BY_NAME[error].needs}"
+        elif BY_NAME[error].needs not in _OF_FIELDS and case.exact_contact is None:
+            allowed = "needs `contact_pressure: solution`: the case has several zones"
+            yield key, value, allowed
 
 
 def _in_works(case: Case) -> Iterator[Fault]:

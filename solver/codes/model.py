@@ -97,7 +97,7 @@ class Model:
         """The reference's pressure (m,) at the centres of the slave faces; None without one."""
         from ..case.expressions import evaluate
 
-        given, exact = self.case.reference.values.get("contact_pressure"), self.case.reference.exact
+        given, exact = self.case.reference.values.get("contact_pressure"), self.case.exact_contact
         centre = zone.operator.surface.centre + self.scene.coordinates.origin
         if exact is not None and "contact_pressure" in exact.quantities:
             return exact.contact_pressure(centre)

@@ -211,7 +211,7 @@ def _of_friction(solution: Solution, zone: ZoneResult, place: Place) -> list[dic
     for name, status in ((STUCK, 1), (SLIDING, 2)):
         mine = zone.friction.status == status
         found += _records(name, **{k: c[mine] for k, c in columns.items()}, p=traction[mine])
-    exact = solution.case.reference.exact
+    exact = solution.case.exact_contact
     if exact and "friction_traction" in exact.quantities:
         values = ExactValues(solution, exact).of_friction(zone, "friction_traction")
         found += _records(SHEAR, s=place(zone.centre), p=signed(values))
@@ -273,7 +273,7 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 def reference(solution: Solution, key: str) -> Any:
     """What the checks compare a quantity with, checked or not; None where the case has nothing."""
-    given, exact = solution.case.reference.values.get(key), solution.case.reference.exact
+    given, exact = solution.case.reference.values.get(key), solution.case.exact_contact
     if given is not None and given is not EXACT:
         return given
     return ExactValues(solution, exact) if exact and key in exact.quantities else None

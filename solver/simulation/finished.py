@@ -20,7 +20,7 @@ from .judgement.validity import remarks
 from .results.solution import Solution
 
 _LOG = logging.getLogger(__name__)
-# Forces below this fraction of the largest one are shown as zero.
+# Forces and pressures below this fraction of the largest of all steps are shown as zero.
 _NOISE = 1e-10
 # The factors of so many names are told.
 _FEW = 6
@@ -57,22 +57,19 @@ def _log_forces(solution: Solution) -> None:
     """Log the forces of each step, and the largest displacement and strain of the last."""
     if units := solution.case.about.units:
         _LOG.log(OUTCOME, "numbers in %s", " and ".join(units.values()))
-    shown = partial(_without_noise, float(np.ptp(solution.mesh.points, axis=0).max()))
+    shown = partial(_without_noise, _sizes(solution))
     for step, given in zip(solution.steps, solution.case.steps, strict=True):
         of_step = f"{called(given, step.factor)}, " if len(solution.steps) > 1 else ""
-        forces = [one.force for one in step.resultants.values()]
-        forces += [one.force for one in step.reactions] + [one.force for one in step.rigid]
-        most = max((float(np.abs(force).max()) for force in forces), default=0.0)
         for name, contact in step.resultants.items():
-            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(most, contact))
+            _LOG.log(OUTCOME, "%szone %s: %s", of_step, name, shown(contact))
         if solution.case.frictional:
             _LOG.log(OUTCOME, "%swork of friction %.6g", of_step, step.dissipation)
         for reaction in step.reactions:
             text = "%sreaction of %s: %s"
-            _LOG.log(OUTCOME, text, of_step, reaction.group, shown(most, reaction))
+            _LOG.log(OUTCOME, text, of_step, reaction.group, shown(reaction))
         for body in step.rigid:
             text = "%scontact on rigid body %s: %s"
-            _LOG.log(OUTCOME, text, of_step, body.body, shown(most, body))
+            _LOG.log(OUTCOME, text, of_step, body.body, shown(body))
     for name, probe in solution.places.probes.items():
         for line in probe.lines():
             _LOG.log(OUTCOME, "probe %s %s", name, line)
@@ -84,14 +81,28 @@ def _log_forces(solution: Solution) -> None:
     _LOG.log(OUTCOME, text, *values)
 
 
-def _without_noise(length: float, most: float, found: Any) -> Any:
-    """A resultant without the round-off beside `most`, the largest force, and its moments."""
-    force, moment = found.force, found.moment
-    return replace(
-        found,
-        force=np.where(np.abs(force) < _NOISE * most, 0.0, force),
-        moment=np.where(np.abs(moment) < _NOISE * most * length, 0.0, moment),
-    )
+def _sizes(solution: Solution) -> dict[str, float]:
+    """The largest size that each part of a resultant has, or can have, in any step."""
+    resultants = [
+        one
+        for step in solution.steps
+        for one in (*step.resultants.values(), *step.reactions, *step.rigid)
+    ]
+    most = max((float(np.abs(one.force).max()) for one in resultants), default=0.0)
+    length = float(np.ptp(solution.mesh.points, axis=0).max())
+    sizes = {"force": most, "friction": most, "moment": most * length}
+    return sizes | {"pressure": solution.largest_pressure}
+
+
+def _without_noise(sizes: dict[str, float], found: Any) -> Any:
+    """A resultant without what is round-off beside the sizes of its parts."""
+    parts = {name: getattr(found, name, None) for name in sizes}
+    quiet = {
+        name: np.where(np.abs(part) < _NOISE * sizes[name], 0.0, part)
+        for name, part in parts.items()
+        if part is not None
+    }
+    return replace(found, **quiet)
 
 
 def called(step: Step, factor: float) -> str:

@@ -58,10 +58,13 @@ def _contact(solution: Solution, zone: ZoneResult, degree: int) -> Iterator[Quan
     """Peak pressure, contact force and contact area of a zone."""
     suffix = f", {zone.name}" if len(solution.zones) > 1 else ""
     theory = 2.0 if zone.recovered is None else 3.0
-    yield Quantity(f"peak pressure{suffix}", peak(zone), known_peak(solution, zone), theory)
+    largest = solution.largest_pressure
+    yield Quantity(
+        f"peak pressure{suffix}", peak(zone), known_peak(solution, zone), theory, largest
+    )
     if zone.resultants is not None:
         force, area = zone.resultants.force, float(zone.resultants.area[0])
-        scale = float(zone.area @ zone.multiplier)
+        scale = largest * float(zone.area.sum())
         size = float(np.linalg.norm(force))
         known = _given(solution, "force", _force(solution, zone))
         yield Quantity(f"contact force{suffix}", size, known, 2 * degree, scale)
@@ -92,7 +95,7 @@ def _reference(solution: Solution, key: str) -> Any:
 
 def _pressures(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.ndarray] | None:
     """The exact pressure (k,) at points of a zone that is covered, and the area (k,) of each."""
-    exact = solution.case.reference.exact
+    exact = solution.case.exact_contact
     if exact is None or (zone.coverage < 1 - 1e-9).any():
         return None
     at = surface_points(solution.mesh.points, zone.faces, solution.case.axisymmetric)
@@ -101,7 +104,7 @@ def _pressures(solution: Solution, zone: ZoneResult) -> tuple[np.ndarray, np.nda
 
 def known_peak(solution: Solution, zone: ZoneResult) -> float | None:
     """The largest pressure of the reference or the exact solution; None where it is infinite."""
-    given, exact = _reference(solution, "contact_pressure"), solution.case.reference.exact
+    given, exact = _reference(solution, "contact_pressure"), solution.case.exact_contact
     if isinstance(given, int | float):
         return float(given)
     if exact is None:

@@ -1,5 +1,6 @@
 """The recovered pressure: exact where it must be, of higher order where the pressure is smooth."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -17,6 +18,7 @@ from solver.lac.reconstruction import FORMS
 from solver.lac.recovery import Recovery
 from solver.mesh import generate
 from solver.simulation.equilibrium import recovery as sweeps
+from solver.simulation.results.solution import pressure_error
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -151,6 +153,19 @@ def test_each_mean_is_kept():
     mean = zone.recovered.values(zone.multiplier, macro, places) @ [1 / 6, 1 / 6, 4 / 6]
     assert mean == pytest.approx(zone.multiplier[macro], rel=1e-13)
     assert np.abs(zone.recovered.coefficients).max() > 0.1
+
+
+def test_without_neighbours_the_error_is_unknown():
+    """One macro-element, or two of which one is pressed: nothing tells how a pressure varies."""
+    case = waves("QUAD8", "QUAD8", 40, "linear")
+    case["mesh"]["bottom"]["divisions"] = [1, 1]
+    solution = solve_case(case)
+    assert np.isnan(solution.solution.zones[0].pressure_error).all()
+    assert solution.solution.pressure_error_estimate is None
+    assert "error of the pressure unknown" in str(solution)
+    beside = replace(solution.solution.zones[0], pressure_error=np.array([3.0]))
+    some = replace(beside, multiplier=np.array([1e3]))
+    assert pressure_error([some, solution.solution.zones[0]]) == pytest.approx(3e-3 / 50**0.5, 1e-2)
 
 
 @pytest.mark.parametrize("form", ["none", "quadratic"])

@@ -8,6 +8,7 @@ import pytest
 
 import solver.lac.threads
 import solver.verification.in_cells
+from solver.case.expressions import EXACT
 from solver.case.material import Material
 from solver.case.rigid import Rigid
 from solver.case.solutions.catalogue import SOLUTIONS
@@ -60,6 +61,20 @@ def interpolated(solution, cells, exact, size):
 
 def test_without_an_exact_solution_there_are_none(tmp_path):
     assert errors(plane(tmp_path)) == {}
+
+
+def test_a_solution_of_one_zone_says_nothing_of_another(handmade):
+    handmade.case = replace(handmade.case, zones=handmade.case.zones * 2)
+    assert max(errors(handmade).values()) < 1e-14
+    assert errors(handmade).keys() == {
+        "displacement_l2",
+        "displacement_h1",
+        "stress_l2",
+        "stress_max",
+    }
+    reference = replace(handmade.case.reference, values={"contact_pressure": EXACT})
+    handmade.case = replace(handmade.case, reference=reference)
+    assert "pressure_l2" in errors(handmade)
 
 
 def test_the_exact_state_has_none(handmade):

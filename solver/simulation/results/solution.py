@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Normals that differ by less are those of a flat surface.
 _FLAT = 1e-9
+# The error of pressures is not known where it is not for so much of the square of their norm.
+_UNKNOWN = 1e-2
 
 
 class Line(NamedTuple):
@@ -139,7 +141,8 @@ class ZoneResult:
     theirs. `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes;
     None where these do not determine it (see `results.balance`). `pressure_error` (m,) estimates
     the L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*;
-    None where multipliers belong to nodes. `recovered` is p* where the case asks for one.
+    NaN where no neighbours determine that, None where multipliers belong to nodes. `recovered` is
+    p* where the case asks for one.
     `resultants`: area, force, moment and edges of contact. `friction`: see there; None without.
     """
 
@@ -202,16 +205,26 @@ class ZoneResult:
 
 
 def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
-    """The estimated L2 error of the constants of zones over their norm; None where unknown."""
-    known = [zone for zone in zones if zone.pressure_error is not None]
-    if not known:
-        return None
-    scale = max(float(zone.multiplier.max(initial=0.0)) for zone in known)
+    """The estimated L2 error of the constants of zones over their norm.
+
+    None where that of more than `_UNKNOWN` of the square of the norm is unknown.
+    """
+    scale = max((float(zone.multiplier.max(initial=0.0)) for zone in zones), default=0.0)
     if not scale > 0:
-        return 0.0
-    errors = [np.asarray(zone.pressure_error) / scale for zone in known]
-    whole = [zone.area * zone.coverage * (zone.multiplier / scale) ** 2 for zone in known]
-    return float(np.linalg.norm(np.concatenate(errors)) / np.sqrt(np.concatenate(whole).sum()))
+        return 0.0 if any(zone.pressure_error is not None for zone in zones) else None
+    errors = np.concatenate([_errors(zone) for zone in zones]) / scale
+    whole = np.concatenate([z.area * z.coverage * (z.multiplier / scale) ** 2 for z in zones])
+    known = np.isfinite(errors)
+    if not whole[known].sum() > (1 - _UNKNOWN) * whole.sum():
+        return None
+    return float(np.linalg.norm(errors[known]) / np.sqrt(whole.sum()))
+
+
+def _errors(zone: ZoneResult) -> np.ndarray:
+    """Its `pressure_error` (m,), NaN where that is unknown."""
+    if zone.pressure_error is None:
+        return np.full(len(zone.area), np.nan)
+    return zone.pressure_error
 
 
 @dataclass

@@ -172,6 +172,14 @@ def test_an_error_that_is_not_known_has_no_tolerance(tolerance, solution, messag
     assert message in str(error.value)
 
 
+def test_with_several_zones_it_is_said_that_the_solution_is_of_all():
+    plain = CASE.replace("0.02}}]", "0.02}}, {{name: other, slave: t, master: n}}]")
+    plain += "tolerance: {{displacement_l2: 0.01, pressure_l2: 0.01}}\n"
+    with pytest.raises(InputError, match="pressure_l2 = 0.01: needs `contact_pressure: solution`"):
+        parse(plain=plain)
+    assert parse(plain=plain, more="contact_pressure: solution").exact_contact
+
+
 def test_every_solution_says_what_its_parameters_are():
     for name, cls in SOLUTIONS.items():
         assert cls.name == name
