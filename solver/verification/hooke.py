@@ -20,7 +20,7 @@ from ..mechanics.fem.stress import COMPONENTS
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution
 from ..simulation.scene.groups import ALL
-from ..simulation.scene.parts.strain import strain_at
+from ..simulation.scene.parts.strain import strain_in
 from .in_cells import deformable_parts, in_cells
 from .samples import Reference, Sample
 
@@ -84,7 +84,8 @@ def _stress_in(
     lame, shear = (each[:, None] for each in lame_parameters(*elastic[part].T))
     initial = np.zeros((*at.slope.shape[:2], 6))
     if any(load.strains for load in solution.case.loads):
-        initial = _initial_strain(solution, number, part, place).reshape(initial.shape)
+        sets = {name: of_blocks[number] for name, of_blocks in solution.mesh.cell_sets.items()}
+        initial = strain_in(solution.case, sets, part, place).reshape(initial.shape)
     mean = lame * (np.einsum("cqii->cq", at.slope) - initial[..., :3].sum(axis=-1))
     if at.mean is not None:
         mean = np.where(np.isnan(at.mean), mean, at.mean)
@@ -97,20 +98,6 @@ def _stress_in(
     stress = (stress - 2 * shear[..., None] * initial).reshape(-1, 6)
     owners = block.data[part, 0], first + part
     return place, stress, *(np.repeat(each, mean.shape[1]) for each in owners)
-
-
-def _initial_strain(
-    solution: Solution, block: int, part: np.ndarray, place: np.ndarray
-) -> np.ndarray:
-    """The initial strain (k, 6) in the last step at points (k, dim) in cells (n,) of a block."""
-    case, found = solution.case, np.zeros((len(place), 6))
-    for load in (load for load in case.loads if load.strains):
-        here = np.ones(len(place), dtype=bool)
-        if load.group != ALL:
-            mine = np.isin(part, solution.mesh.cell_sets[load.group][block])
-            here = np.repeat(mine, len(place) // len(part))
-        found[here] += load.factor(case.steps[-1]) * strain_at(case, load, place[here])
-    return found
 
 
 def _material(solution: Solution, block: int) -> np.ndarray:

@@ -175,7 +175,7 @@ def test_an_error_that_is_not_known_has_no_tolerance(tolerance, solution, messag
 def test_with_several_zones_it_is_said_that_the_solution_is_of_all():
     plain = CASE.replace("0.02}}]", "0.02}}, {{name: other, slave: t, master: n}}]")
     plain += "tolerance: {{displacement_l2: 0.01, pressure_l2: 0.01}}\n"
-    with pytest.raises(InputError, match="pressure_l2 = 0.01: needs `contact_pressure: solution`"):
+    with pytest.raises(InputError, match=r"pressure_l2 .* needs `contact_pressure: sol"):
         parse(plain=plain)
     assert parse(plain=plain, more="contact_pressure: solution").exact_contact
 

@@ -6,6 +6,7 @@ stress.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,6 +74,21 @@ def strain_at(case: Case, load: Load, place: np.ndarray) -> np.ndarray:
             found[:, COMPONENTS.index(name)] = evaluate(value, place)
     if case.thin:
         found[:, 2] = 0.0
+    return found
+
+
+def strain_in(
+    case: Case, sets: Mapping[str, np.ndarray], cells: np.ndarray, place: np.ndarray
+) -> np.ndarray:
+    """The initial strain (k, 6) in the last step at points (k, dim), k/n in each of `cells` (n,).
+
+    `sets` has the cells of groups, by name.
+    """
+    found = np.zeros((len(place), 6))
+    for load in (load for load in case.loads if load.strains):
+        mine = load.group == ALL or np.isin(cells, sets[load.group])
+        here = np.repeat(np.broadcast_to(mine, len(cells)), len(place) // len(cells))
+        found[here] += load.factor(case.steps[-1]) * strain_at(case, load, place[here])
     return found
 
 
