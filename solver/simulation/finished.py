@@ -83,7 +83,7 @@ def _log_forces(solution: Solution) -> None:
 
 def _sizes(solution: Solution) -> dict[str, float]:
     """The largest size that each part of a resultant has, or can have, in any step."""
-    resultants = [
+    resultants: list[Any] = [
         one
         for step in solution.steps
         for one in (*step.resultants.values(), *step.reactions, *step.rigid)
