@@ -21,10 +21,13 @@ def same(a, b):
 
 
 def in_order(solution):
-    """Tables of sub-faces and master faces have no order of their own."""
+    """Tables of sub-faces and master faces have no order of their own; a type has one of these."""
     for zone in solution.zones:
         zone.faces.sort(key=lambda faces: faces[0])
-        zone.master_faces.sort(key=lambda faces: faces[0])
+        joined = {kind: [] for kind in sorted(kind for kind, _ in zone.master_faces)}
+        for kind, nodes in zone.master_faces:
+            joined[kind].append(nodes)
+        zone.master_faces = [(kind, np.concatenate(nodes)) for kind, nodes in joined.items()]
     return solution
 
 

@@ -22,7 +22,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "space": ("strain", "stress", "axisymmetric", "solid"),
     "slave cells": (*PLANE, *SOLID),
     "master cells": (*PLANE, *SOLID),
-    "interface": ("flat", "tilted", "kinked", "curved"),
+    "slave faces": ("one type", "two types"),
+    "interface": ("flat", "tilted", "kinked", "edge", "curved"),
     "treatment": ("lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"),
     "normal": ("element", "nodal", "master"),
     "hexahedra": ("pyramids", "hexahedra"),
@@ -33,7 +34,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
         *("none", "meshed", "open", "interference"),
         *("clearance", "clearance 0", "clearance, overlap"),
     ),
-    "master": ("meshed", "rigid", "rigid, by force", "plane"),
+    "master": ("meshed", "rigid", "rigid, by force", "faces", "plane", "parabola"),
     "master size": ("coarser", "as fine", "finer"),
     "supports": ("imposed", "normal", "springs", "together", "cyclic"),
     "load": ("pressure", "traction", "force"),
@@ -42,14 +43,22 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "motion": ("small", "large"),
     "materials": ("equal", "stiff master", "nearly incompressible", "mixed form"),
     "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
-    "form": ("as it is", "exchanged", "renumbered", "perturbed", "rotated", "far", "other units"),
+    "form": (
+        *("as it is", "exchanged", "renumbered", "perturbed"),
+        *("rotated", "mirrored", "far", "other units"),
+    ),
     "work": ("lean", "everything", "multigrid"),
 }
 PLAIN = {name: values[0] for name, values in OPTIONS.items()}
 FRICTION = ("held", "stick", "slip", "slip back")
 SHEARED = ("stick", "slip", "slip back")
-SHAPED = ("kinked", "curved")
-RIGID = ("rigid", "rigid, by force", "plane")
+KINKS = {"kinked": 0.1, "edge": 1.0}  # the slopes of their sides
+SHAPED = (*KINKS, "curved")
+# Rigid masters without cells, and all of them.
+BARE = ("faces", "plane", "parabola")
+RIGID = ("rigid", "rigid, by force", *BARE)
+# Cells of two types on one surface: the second half of it has cells of the other one.
+HALVES = {"QUAD4": "TRIA3", "QUAD9": "TRIA6", "HEXA8": "PENTA6", "HEXA20": "PENTA15"}
 
 
 class Rule(NamedTuple):
@@ -154,12 +163,7 @@ REFUSED = (
         ("hexahedra", "HEXA20"),
     ),
     Rule(
-        {"master": ("plane",), "form": ("exchanged",)},
-        "a rigid side is the master",
-        ("master", "directions"),
-    ),
-    Rule(
-        {"master": ("rigid", "rigid, by force"), "form": ("exchanged",)},
+        {"master": RIGID, "form": ("exchanged",)},
         "a rigid side is the master",
         ("master", "directions"),
     ),
@@ -262,12 +266,12 @@ EXCLUDED = (
         },
         "the shear passes a zone without friction",
     ),
-    Rule(
-        {"friction": ("none",), "second zone": ("same",), "master": ("plane",)}, "no second surface"
-    ),
-    Rule({"master": ("plane",), "second zone": _not("second zone", "none")}, "no second surface"),
-    Rule({"master": ("plane",), "gap": ("clearance, overlap",)}, "a plane has no mesh"),
+    Rule({"master": BARE, "second zone": _not("second zone", "none")}, "no second surface"),
+    Rule({"master": ("plane", "parabola"), "gap": ("clearance, overlap",)}, "has no mesh"),
     Rule({"master": ("plane",), "interface": SHAPED}, "a plane is no such surface"),
+    Rule({"master": ("parabola",), "interface": _not("interface", "curved")}, "no such surface"),
+    Rule({"master": ("parabola",), "space": ("axisymmetric", "solid")}, "no such surface"),
+    Rule({"master": ("parabola",), "slave cells": LINEAR}, "surfaces differ"),
     Rule(
         {"interface": ("tilted",), "second zone": _not("second zone", "none")},
         "interfaces are not parallel",
@@ -286,9 +290,7 @@ EXCLUDED = (
     ),
     Rule({"supports": ("together",), "form": ("rotated",)}, "components along axes"),
     Rule({"space": ("axisymmetric",), "supports": ("cyclic",)}, "no sides"),
-    Rule({"space": ("axisymmetric",), "form": ("rotated",)}, "the axis stays"),
-    Rule({"master": ("plane",), "supports": ("springs", "together")}, "no elastic body is loaded"),
-    Rule({"master": ("plane",), "load": ("traction", "force")}, "no elastic body is loaded"),
+    Rule({"space": ("axisymmetric",), "form": ("rotated", "mirrored")}, "the axis stays"),
     Rule(
         {"master": RIGID, "supports": ("springs", "together"), "second zone": ("none",)},
         "no elastic body is loaded",
@@ -326,7 +328,7 @@ EXCLUDED = (
         Rule({"space": ("solid",), "interface": shapes, side: cells}, "edges differ")
         for side in ("slave cells", "master cells")
         for shapes, cells in (
-            (("kinked",), _not(side, *HEXA)),
+            (tuple(KINKS), _not(side, *HEXA)),
             (("curved",), tuple(c for c in LINEAR if c != "HEXA8")),
         )
     ),
@@ -349,6 +351,12 @@ EXCLUDED = (
     Rule(
         {"interface": SHAPED, "master": RIGID, "also": _not("also", "strain")}, "a state of its own"
     ),
+    Rule(
+        {"slave faces": ("two types",), "slave cells": _not("slave cells", *HALVES)},
+        "halves of cells of this type are no cells",
+    ),
+    Rule({"slave faces": ("two types",), "treatment": POINTS}, "meshes of two sides differ"),
+    Rule({"slave faces": ("two types",), "supports": ("cyclic",)}, "meshes of two sides differ"),
 )
 
 

@@ -6,8 +6,10 @@ import meshio
 import numpy as np
 
 from solver.mesh import generate
+from solver.mesh.tidy import tidy
 
-from .options import SHAPED
+from .cells import bare, halved
+from .options import KINKS
 from .state import AXES, Body, States
 
 
@@ -17,26 +19,34 @@ class Places(States):
     def recipe(self) -> dict[str, Any]:
         """Of the mesh, its interface flat."""
         start = self.start
+        given = [(b.name, b.cells, b.low, b.divisions) for b in self.bodies]
+        if self.row["master"] == "faces":
+            given.append(("upper", self.row["master cells"], 0.0, self.sizes[1]))
         bricks = []
-        for body in self.bodies:
-            low = [start, *[0.0] * (self.dim - 2), body.low]
-            high = [start + 1, *[1.0] * (self.dim - 2), body.low + 1]
-            block = {"cells": body.cells, "divisions": [body.divisions] * self.dim}
-            if body.cells.startswith(("PENTA", "PYRA")):
-                block["contact"] = "TRIA3" if body.cells in ("PENTA6", "PYRA5") else "TRIA6"
-            bricks.append({"name": body.name, "low": low, "high": high, "block": block})
+        for name, cells, level, divisions in given:
+            low = [start, *[0.0] * (self.dim - 2), level]
+            high = [start + 1, *[1.0] * (self.dim - 2), level + 1]
+            block = {"cells": cells, "divisions": [divisions] * self.dim}
+            if cells.startswith(("PENTA", "PYRA")):
+                block["contact"] = "TRIA3" if cells in ("PENTA6", "PYRA5") else "TRIA6"
+            bricks.append({"name": name, "low": low, "high": high, "block": block})
         return {"recipe": "bricks", "bricks": bricks}
 
     def mesh(self) -> meshio.Mesh:
         """The mesh, shaped and moved."""
         mesh, start = generate(self.recipe(), "pairs"), self.start
+        if self.row["slave faces"] == "two types":
+            mesh = halved(mesh, "lower", start + 0.5)
+        if self.row["master"] == "faces":
+            mesh = bare(mesh, "upper", "wall")
         points = mesh.points[:, : self.dim]
         x, z = points[:, 0] - start, points[:, -1]
         y = points[:, 1] if self.dim == 3 else 0 * x
         shape = {
             "flat": 0 * x,
             "tilted": 0.2 * x,
-            "kinked": 0.1 * np.abs(x - 0.5),
+            "kinked": KINKS["kinked"] * np.abs(x - 0.5),
+            "edge": KINKS["edge"] * np.abs(x - 0.5),
             "curved": 0.1 * (4 * x * (1 - x) + y * (1 - y)),
         }[self.row["interface"]]
         points[:, -1] += shape * np.clip(1 - np.abs(z), 0, None)
@@ -48,7 +58,7 @@ class Places(States):
         mesh.points[:, : self.dim] = (
             self.placed.scale * points @ self.placed.turn.T + self.placed.origin
         )
-        return mesh
+        return tidy(mesh, "pairs") if self.row["form"] == "mirrored" else mesh
 
     def groups(self) -> dict[str, Any]:
         """The sides, ends and contact surfaces of all bodies."""
@@ -82,7 +92,11 @@ class Places(States):
             at = -normal @ (self.apart if body.name == "upper" else 0 * self.apart)
             at -= normal[0] * start
             height = self.placed.affine(normal, np.eye(self.dim), at * self._up())
-            reach = self.placed.scale * (0.13 if self.row["interface"] in SHAPED else 1e-6)
+            reach = self.placed.scale * (0.13 if self.row["interface"] == "curved" else 1e-6)
+            if self.row["interface"] in KINKS:
+                along = np.eye(self.dim)[0]
+                from_edge = self.placed.affine(along, np.eye(self.dim), -(start + 0.5) * along)
+                height += f" - {KINKS[self.row['interface']]}*abs({from_edge})"
             groups[f"{body.name}-{inner}"] = {
                 "within": body.name,
                 "where": f"{reach!r} - abs({height})",

@@ -13,7 +13,7 @@ from solver.case.model import Case
 from solver.case.reader import parse_case
 from solver.mesh.transforms import transform
 
-from .options import RIGID, Row
+from .options import BARE, RIGID, Row
 from .places import Places
 from .reference import references
 from .state import AXES, GAP, MU, STRAIN, Body, Placed
@@ -83,7 +83,7 @@ class _Builder(Places):
     def _zone(self) -> dict[str, Any]:
         row = self.row
         zone: dict[str, Any] = {"name": "one", "slave": "lower-top", "master": "upper-under"}
-        if row["master"] == "plane":
+        if row["master"] in BARE:
             zone["master"] = "wall"
         if row["friction"] != "none":
             zone["friction"] = MU
@@ -292,13 +292,19 @@ class _Builder(Places):
             self._load("lower-again", "body_force", [-v for v in value], **named)
 
     def _rigid(self) -> dict[str, Any]:
-        row = self.row
+        row, body = self.row, dict[str, Any]()
+        surface = {
+            "point": self.placed.point(self.apart),
+            "normal": self.placed.vector(-self.normal),
+        }
         if row["master"] == "plane":
-            up = self.placed.vector(-self.normal)
-            point = self.placed.point(self.apart)
-            body: dict[str, Any] = {"plane": {"point": point, "normal": up}}
+            body["plane"] = surface
+        elif row["master"] == "parabola":  # of the slope 0.4 (1 - 2 x), its apex at x = 0.5
+            surface["point"] = self.placed.point(np.array([0.5, 0.1]))
+            radius = self.placed.scale / 0.8
+            body["parabola"] = surface | {"radius": radius, "hollow": True}
         else:
-            body = {"rigid": True}
+            body["rigid"] = True
         move = self.placed.scale * self.placed.turn @ self.moved
         axes = [self.dim - 1] if self.axisymmetric else range(self.dim)
         motion = {AXES[a]: float(move[a]) for a in axes if move[a]}
@@ -310,7 +316,7 @@ class _Builder(Places):
             body["move"] = motion
         if motion or "force" in body:
             body |= self.named
-        return {"wall" if row["master"] == "plane" else "upper": body}
+        return {"wall" if row["master"] in BARE else "upper": body}
 
     def _push(self) -> list[float]:
         """The force on the rigid body in zone one, less that of zone two."""

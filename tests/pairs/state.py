@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .options import LINEAR, POINTS, RIGID, SHAPED, Row
+from .options import BARE, KINKS, LINEAR, POINTS, RIGID, SHAPED, Row
 
 YOUNG, POISSON, PRESSURE, MU, SLIDE, GAP, STRAIN = 2000.0, 0.3, 25.0, 0.4, 0.004, 0.002, 1e-3
 # How deep meshes lie in one another where a clearance says how far the bodies are apart.
@@ -82,6 +82,8 @@ class States:
             turn[:2, :2] = [[c, -s], [s, c]]
             if self.dim == 3:
                 turn = turn @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+        if row["form"] == "mirrored":
+            turn[0, 0] = -1.0
         if row["form"] == "far":
             origin[:] = [0.0, 100.0] if self.axisymmetric else 100.0
         self.placed = Placed(turn, origin, 1e-6 if row["form"] == "other units" else 1.0)
@@ -151,21 +153,24 @@ class States:
         gap = {"none": 0.0, "clearance 0": 0.0, "interference": -GAP}.get(self.row["gap"], GAP)
         return slide * self.along - gap * self.normal
 
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """The divisions of slave and master."""
+        row = self.row
+        if (row["interface"] in SHAPED and not self._quadratic()) or row["treatment"] in POINTS:
+            return 2, 2
+        most = 4 if row["interface"] in KINKS else 3
+        return {"coarser": (most, 2), "as fine": (2, 2), "finer": (2, most)}[row["master size"]]
+
     def _states(self) -> Iterator[Body]:
         row = self.row
         poisson = 0.4999 if row["materials"] == "nearly incompressible" else POISSON
         stiff = 1e6 if row["materials"] == "stiff master" else 1.0
         if row["interface"] in SHAPED:  # an initial strain of the same stress loses its digits
             stiff = min(stiff, 1e4)
-        rigid = row["master"] in RIGID
-        sizes = {"coarser": (3, 2), "as fine": (2, 2), "finer": (2, 3)}[row["master size"]]
-        if (row["interface"] in SHAPED and not self._quadratic()) or row["treatment"] in POINTS:
-            sizes = (2, 2)
-        elif row["interface"] == "kinked":
-            sizes = {"coarser": (4, 2), "as fine": (2, 2), "finer": (2, 4)}[row["master size"]]
-        rest = np.zeros(self.dim)
+        rigid, sizes, rest = row["master"] in RIGID, self.sizes, np.zeros(self.dim)
         yield self._body("lower", -1.0, sizes[0], 1.0, poisson, rest, False, not rigid)
-        if row["master"] == "plane":
+        if row["master"] in BARE:
             return
         upper = self._body("upper", 0.0, sizes[1], stiff, poisson, self.moved, rigid, True)
         upper.shift = upper.shift - upper.gradient @ self.apart

@@ -17,7 +17,7 @@ from tests.workflow.projects import ROOT, new_project
 
 
 def test_what_is_killed_recovers(tmp_path):
-    targets = ["batch's job", "batch's server"]
+    targets = ["batch's job", "batch's server", "report"]
     failures, struck = kill_at_random(tmp_path / "project", len(targets), 1, targets)
     assert failures == []
     assert struck.total() == len(targets)
