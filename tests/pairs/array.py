@@ -14,6 +14,8 @@ from covertable import make
 from .options import EXCLUDED, OPTIONS, PLANE, REFUSED, SOLID, Row, plain_in, possible
 
 PAIRS = 2
+# Of many arrays one in which all planted faults show: a body that opens in the end hides others.
+_SALT = "2"
 _STORED = Path(__file__).with_name("rows.json")
 Part = tuple[tuple[str, str], ...]
 _CELLS = ("slave cells", "master cells")
@@ -39,11 +41,11 @@ def _rows(domain: dict[str, tuple[str, ...]], strength: int) -> list[Row]:
             joined = {"operator": "and", "conditions": both}
             constraints.append({"operator": "not", "condition": joined})
     values = {name: list(values) for name, values in domain.items()}
-    return make(values, strength=strength, constraints=constraints)
+    return make(values, strength=strength, constraints=constraints, salt=_SALT)
 
 
 def stored() -> list[Row]:
-    """The rows for pairs that are kept, half a minute to make; none where options have changed."""
+    """The rows for pairs that are kept, minutes to make; none where options have changed."""
     given = json.loads(_STORED.read_text())
     if any(len(row) != len(OPTIONS) for row in given):
         return []

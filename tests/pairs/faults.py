@@ -239,4 +239,14 @@ FAULTS = (
         "_as_in_the_last",
         lambda true: lambda *given: True,
     ),
+    Fault(
+        "layers-are-bodies",
+        "the cells behind the faces of a rigid surface count where bodies lie in one another",
+        {"master": "faces", "interface": "curved", "also": "strain"},
+        validity,
+        "meshed",
+        lambda true: lambda scene: scene.mesh.cells,
+        "solid",
+        "PENTA15",
+    ),
 )

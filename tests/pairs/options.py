@@ -22,13 +22,13 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "space": ("strain", "stress", "axisymmetric", "solid"),
     "slave cells": (*PLANE, *SOLID),
     "master cells": (*PLANE, *SOLID),
-    "slave faces": ("one type", "two types"),
+    "slave faces": ("one type", "two types", "two groups"),
     "interface": ("flat", "tilted", "kinked", "edge", "curved"),
     "treatment": ("lac", "uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual"),
     "normal": ("element", "nodal", "master"),
     "hexahedra": ("pyramids", "hexahedra"),
     "friction": ("none", "held", "stick", "slip", "slip back"),
-    "recovery": ("none", "linear", "quadratic", "smooth", "automatic"),
+    "recovery": ("none", "linear", "quadratic", "smooth", "automatic", "5 sweeps"),
     "stabilised": ("no", "yes"),
     "gap": (
         *("none", "meshed", "open", "interference"),
@@ -39,7 +39,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "supports": ("imposed", "normal", "springs", "together", "cyclic"),
     "load": ("pressure", "traction", "force"),
     "also": ("nothing", "body force", "strain", "temperature"),
-    "steps": ("one", "factors", "path", "unloaded"),
+    "steps": ("one", "factors", "path", "unloaded", "substeps"),
     "motion": ("small", "large"),
     "materials": ("equal", "stiff master", "nearly incompressible", "mixed form"),
     "second zone": ("none", "same", "plain", "friction", "recovery", "stabilised", "nodal"),
@@ -200,13 +200,12 @@ EXCLUDED = (
         },
         "nodes of a stiff slave outnumber those of a soft master: nearly singular",
     ),
-    Rule(
-        {
-            "materials": ("stiff master",),
-            "friction": ("slip back",),
-            "second zone": ("friction",),
-        },
-        "friction of a stiff body, by displacements rounded to 5e-8 of it",
+    *(
+        Rule(
+            {"materials": ("stiff master",), "friction": ("slip back",), name: (value,)},
+            "friction of a stiff body, by displacements rounded to 5e-8 of it",
+        )
+        for name, value in (("second zone", "friction"), ("form", "exchanged"))
     ),
     Rule({"space": _not("space", "solid"), "slave cells": SOLID}, "cells of another dimension"),
     Rule({"space": _not("space", "solid"), "master cells": SOLID}, "cells of another dimension"),
@@ -269,9 +268,24 @@ EXCLUDED = (
     Rule({"master": BARE, "second zone": _not("second zone", "none")}, "no second surface"),
     Rule({"master": ("plane", "parabola"), "gap": ("clearance, overlap",)}, "has no mesh"),
     Rule({"master": ("plane",), "interface": SHAPED}, "a plane is no such surface"),
-    Rule({"master": ("parabola",), "interface": _not("interface", "curved")}, "no such surface"),
-    Rule({"master": ("parabola",), "space": ("axisymmetric", "solid")}, "no such surface"),
-    Rule({"master": ("parabola",), "slave cells": LINEAR}, "surfaces differ"),
+    Rule({"master": BARE, "supports": ("springs", "together")}, "no elastic body is loaded"),
+    Rule({"master": BARE, "load": ("traction", "force")}, "no elastic body is loaded"),
+    *(
+        Rule({"master": ("parabola",), name: values}, "a state on one curve")
+        for name, values in (
+            ("interface", _not("interface", "curved")),
+            ("space", ("axisymmetric", "solid")),
+            ("slave cells", LINEAR),
+            ("master cells", LINEAR),
+            ("treatment", ("node_to_segment", "nodal_dual")),
+            ("normal", ("nodal", "master")),
+            ("friction", SHEARED),
+            ("gap", _not("gap", "none", "clearance 0")),
+            ("supports", ("cyclic",)),
+            ("also", _not("also", "strain")),
+            ("motion", ("large",)),
+        )
+    ),
     Rule(
         {"interface": ("tilted",), "second zone": _not("second zone", "none")},
         "interfaces are not parallel",
@@ -354,6 +368,11 @@ EXCLUDED = (
     Rule(
         {"slave faces": ("two types",), "slave cells": _not("slave cells", *HALVES)},
         "halves of cells of this type are no cells",
+    ),
+    Rule({"slave faces": ("two groups",), "form": ("perturbed",)}, "selected by place"),
+    Rule(
+        {"slave faces": ("two groups",), "slave cells": ("TETRA4", "TETRA10")},
+        "their faces cross the place where the groups part",
     ),
     Rule({"slave faces": ("two types",), "treatment": POINTS}, "meshes of two sides differ"),
     Rule({"slave faces": ("two types",), "supports": ("cyclic",)}, "meshes of two sides differ"),

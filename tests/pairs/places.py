@@ -97,10 +97,11 @@ class Places(States):
                 along = np.eye(self.dim)[0]
                 from_edge = self.placed.affine(along, np.eye(self.dim), -(start + 0.5) * along)
                 height += f" - {KINKS[self.row['interface']]}*abs({from_edge})"
-            groups[f"{body.name}-{inner}"] = {
-                "within": body.name,
-                "where": f"{reach!r} - abs({height})",
-            }
+            there = f"{reach!r} - abs({height})"
+            if body.name == "lower" and self.row["slave faces"] == "two groups":
+                groups |= self._parts(there)
+            else:
+                groups[f"{body.name}-{inner}"] = {"within": body.name, "where": there}
             plane(
                 f"{body.name}-{'base' if body.name == 'lower' else 'top'}",
                 body,
@@ -110,3 +111,16 @@ class Places(States):
         if self.row["also"] == "body force":
             groups["lower-again"] = ["lower"]
         return groups
+
+    def _parts(self, there: str) -> dict[str, Any]:
+        """The slave's surface as a list of two groups, which part between two faces."""
+        part = self.start + (2 / 3 if self.sizes[0] == 3 else 0.5)
+        along = np.eye(self.dim)[0]
+        beyond = self.placed.affine(along, np.eye(self.dim), -part * along)
+        near = f"{1e-6 * self.placed.scale!r}"
+        sides = {"lower-top-1": f"{near} - ({beyond})", "lower-top-2": f"{near} + {beyond}"}
+        parts: dict[str, Any] = {
+            name: {"within": "lower", "where": f"min({there}, {side})"}
+            for name, side in sides.items()
+        }
+        return parts | {"lower-top": list(parts)}

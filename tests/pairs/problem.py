@@ -23,6 +23,7 @@ _LAST = 0.4
 _STEPS: dict[str, dict[str, Any]] = {
     "factors": {"steps": [_LAST / 2, _LAST]},
     "unloaded": {"steps": [_LAST, 0.0]},
+    "substeps": {"steps": [_LAST], "substeps": 3},
     "path": {"steps": [{"go": _LAST}, {"go": _LAST / 2}, {"go": _LAST}]},
     "slip back": {"steps": [{"press": 1, "shear": -1}, {"press": 1, "shear": 1}]},
 }
@@ -89,6 +90,8 @@ class _Builder(Places):
             zone["friction"] = MU
         for key in ("treatment", "normal", "hexahedra", "recovery"):
             zone[key] = row[key]
+        if row["recovery"] == "5 sweeps":
+            zone |= {"recovery": "linear", "sweeps": 5}
         if row["stabilised"] == "yes":
             zone["stabilised"] = True
         scaled = GAP * self.placed.scale
@@ -103,8 +106,8 @@ class _Builder(Places):
         zone: dict[str, Any] = {"name": "two", "slave": "cap-under", "master": "upper-top"}
         if kind == "same":
             given = self._zone()
-            zone |= {k: given[k] for k in ("treatment", "normal", "hexahedra", "recovery")}
-            zone |= {k: given[k] for k in ("stabilised",) if k in given}
+            kept = ("treatment", "normal", "hexahedra", "recovery", "sweeps", "stabilised")
+            zone |= {key: given[key] for key in kept if key in given}
             if "friction" in given:
                 zone["friction"] = 2 * MU
         elif kind == "friction":

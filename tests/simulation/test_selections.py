@@ -157,6 +157,7 @@ REFUSED = [
     ("where: -y", "where: -z", "groups.cells.where = '-z': z in a plane case"),
     ("where: -y", "", "and exactly one of plane, sphere, box, where}"),
     ("within: bottom", "within: botom", "groups.slave = 'botom': no such group in the mesh"),
+    ("within: bottom", "within: cells", "= 'cells': is made after it: list that group first"),
     ("  low: ", "  base: ", "groups.base = 'base': the mesh has a group of this name"),
     ("  low: ", "  all: ", "groups.all = 'all': the mesh has a group of this name"),
     ("group: press, pressure: 25.0", "at: [0, 1], pressure: 2.0", "{at, force}"),

@@ -59,6 +59,8 @@ def _add(case: Case, mesh: meshio.Mesh, selection: Selection) -> None:
     for group in selection.groups:
         if group not in names:
             allowed = f"no such group in the mesh; {hint(group, names)}"
+            if any(other.name == group for other in case.mesh.selections):
+                allowed = "is made after it: list that group first"
             raise InputError(case.path, selection.key, group, allowed)
     if selection.of == "groups":
         _add_union(mesh, selection)
