@@ -17,10 +17,10 @@ from .rigid import Rigid
 Fault = tuple[str, object, str]
 # Keys of the reference that need contact.
 _OF_CONTACT = {"contact_pressure", "gap", "force", "contact_area", "coverage", "pressure_at"}
+# Those that need friction.
+_OF_FRICTION = {"friction_traction", "slip", "stick_area", "dissipation"}
 # What an exact solution has of bodies, not of contact.
 _OF_FIELDS = {"displacement", "gradient", "stress"}
-# Keys that need friction.
-_OF_FRICTION = {"friction_traction", "slip", "stick_area", "dissipation"}
 # Treatments with fewer multipliers than nodes of the slave where two sides move as one.
 _CYCLIC = "lac", "quadrature"
 # Keys of the reference for values at probes.

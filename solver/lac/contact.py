@@ -29,7 +29,7 @@ from .errors import SolveError
 from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import gap_operator
-from .reconstruction import form_of
+from .reconstruction import Reconstruction, form_of
 from .recovery import Recovery, RecoveryRequest, with_status
 from .roughness import Smooth, smoothed
 from .saddle_point import SaddlePoint, numbered
@@ -78,7 +78,7 @@ class RecoveredState:
         The `ContactState` in equilibrium with this pressure. Its `pressure` are the means.
     error
         By slave facet (k,), the L2 norm of the difference between the pressure and its mean: an
-        estimate of the error of one constant on the facet.
+        estimate of the error of one constant on the facet. NaN where too few neighbours are closed.
     """
 
     state: ContactState
@@ -99,7 +99,7 @@ class _UnderRecovery(NamedTuple):
 
     system: SaddlePoint
     closed: np.ndarray
-    fit: csr_matrix
+    fit: Reconstruction
     means: np.ndarray
 
 
@@ -304,9 +304,9 @@ class LocalAverageContact:
         added = numbered(recovery.loads, self._unknown, size).T
 
         def correct(closed: np.ndarray) -> _UnderRecovery:
-            fit = recovery.reconstruction(closed).matrix
-            means = system.settled(closed, added @ fit, shape.sweeps)
-            return _UnderRecovery(system.under(added @ (fit @ means)), closed, fit, means)
+            fit = recovery.reconstruction(closed)
+            means = system.settled(closed, added @ fit.matrix, shape.sweeps)
+            return _UnderRecovery(system.under(added @ (fit.matrix @ means)), closed, fit, means)
 
         def wrong(found: _UnderRecovery) -> bool:
             violation = found.system.trial(found.closed).violation(found.closed)
@@ -322,8 +322,9 @@ class LocalAverageContact:
             raise SolveError("the contact status does not settle under the recovered pressure")
         found = _state(settled.system, settled.closed, state.iterations)
         applied = shape.degree == 2 and shape.keeps_means
-        coefficients = settled.fit @ (settled.means if applied else found.pressure)
-        return RecoveredState(found, recovery.error(coefficients), recovery, coefficients)
+        coefficients = settled.fit.matrix @ (settled.means if applied else found.pressure)
+        error = recovery.error(coefficients, settled.fit)
+        return RecoveredState(found, error, recovery, coefficients)
 
 
 def _state(system: SaddlePoint, closed: np.ndarray, iterations: int) -> ContactState:

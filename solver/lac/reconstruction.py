@@ -156,12 +156,14 @@ def _powers(linear: np.ndarray, squares: np.ndarray, form: Form) -> np.ndarray:
 class Reconstruction:
     """c = `matrix` · p, with `matrix` (m · k, m); `degree` (m,) of the polynomial on each.
 
-    A degree is 0 where a macro-element has too few neighbours for any fit.
+    A degree is 0 where a macro-element has too few neighbours for any fit; `alone` (m,) are those
+    of them that are closed.
     """
 
     form: Form
     matrix: sparse.csr_matrix
     degree: np.ndarray
+    alone: np.ndarray
 
 
 def reconstruct(
@@ -207,7 +209,7 @@ def reconstruct(
     )
     places = (row.astype(int), column.astype(int))
     matrix = sparse.coo_matrix((value, places), shape=(m * form.count(dim), m)).tocsr()
-    return Reconstruction(form=form, matrix=matrix, degree=degree)
+    return Reconstruction(form=form, matrix=matrix, degree=degree, alone=closed & (degree == 0))
 
 
 def _useful(at: Moments, near: sparse.csr_matrix, closed: np.ndarray) -> sparse.csr_matrix:

@@ -108,12 +108,15 @@ class Recovery:
         """The reconstruction among closed macro-elements (m,)."""
         return reconstruct(self.moments, self.near, closed, self.form)
 
-    def error(self, coefficients: np.ndarray) -> np.ndarray:
-        """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,)."""
+    def error(self, coefficients: np.ndarray, fit: Reconstruction) -> np.ndarray:
+        """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,).
+
+        NaN where a `fit` has too few neighbours.
+        """
         c = coefficients.reshape(len(self.products), -1)
         scale = np.abs(c).max(initial=0.0) or 1.0  # squares of the largest numbers overflow
         square = np.einsum("mk,mkl,ml->m", c / scale, self.products, c / scale)
-        return scale * np.sqrt(np.maximum(square, 0.0))
+        return np.where(fit.alone, np.nan, scale * np.sqrt(np.maximum(square, 0.0)))
 
 
 def recovery(

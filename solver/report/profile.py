@@ -273,8 +273,11 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 def reference(solution: Solution, key: str) -> Any:
     """What the checks compare a quantity with, checked or not; None where the case has nothing."""
-    given, exact = solution.case.reference.values.get(key), solution.case.exact_contact
-    if given is not None and given is not EXACT:
+    case = solution.case
+    given, exact = case.reference.values.get(key), case.exact_contact
+    if given is EXACT:
+        exact = case.reference.exact
+    elif given is not None:
         return given
     return ExactValues(solution, exact) if exact and key in exact.quantities else None
 

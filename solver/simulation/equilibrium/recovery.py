@@ -54,7 +54,7 @@ class ZoneFit:
             local=self.recovery.moments.local,
             coefficients=coefficients,
             degree=self.reconstruction.degree,
-            error=self.recovery.error(coefficients),
+            error=self.recovery.error(coefficients, self.reconstruction),
             force=force,
             tractions=tractions,
         )

@@ -11,7 +11,7 @@ from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import surface_nodes, surface_normals
 from ...mechanics.fem.stress import nodal_stress, normal_stress
 from ..equilibrium.problem import ContactProblem
-from ..equilibrium.state import Equilibrium, PressureField
+from ..equilibrium.state import Equilibrium
 from ..scene.bodies import body_names, meshed_cells
 from ..scene.probing import cell_at, faces_at, places_of
 from ..scene.scene import Scene, ZoneScene
@@ -138,7 +138,6 @@ def _zone_result(
     step: StepResult,
 ) -> ZoneResult:
     surface, field = zone.operator.surface, state.fields.get(zone.zone.name)
-    pressure = zone.by_macro_element(state.pressure)
     slave_nodes, master_nodes = surface_nodes(zone.sub_faces), surface_nodes(zone.master_faces)
     slave_normal = surface_normals(scene.points, zone.sub_faces)[slave_nodes]
     master_normal = surface_normals(scene.points, zone.master_faces)[master_nodes]
@@ -149,7 +148,7 @@ def _zone_result(
         centre=surface.centre + scene.coordinates.origin,
         normal=surface.normal,
         area=surface.area,
-        multiplier=pressure,
+        multiplier=zone.by_macro_element(state.pressure),
         gap=zone.by_macro_element(state.gap),
         closed=closed_of(zone, state),
         coverage=surface.covered / surface.area,
@@ -160,16 +159,11 @@ def _zone_result(
         nodal=_nodal_contact(zone, state),
         pressure_of_forces=pressure_of_forces,
         meshed_gap=_meshed_gap(scene, zone),
-        pressure_error=None if field is None else _pressure_error(field, pressure),
+        pressure_error=None if field is None else field.error,
         recovered=recovered_pressure(scene, zone, state),
         resultants=step.resultants[zone.zone.name],
         friction=zone_friction(zone, state) if zone.slips and state.friction else None,
     )
-
-
-def _pressure_error(field: PressureField, pressure: np.ndarray) -> np.ndarray:
-    """The estimated error (m,) of the constants; NaN where no neighbours tell a slope."""
-    return np.where((field.degree == 0) & (pressure > 0), np.nan, field.error)
 
 
 def _meshed_gap(scene: Scene, zone: ZoneScene) -> np.ndarray:
