@@ -341,7 +341,7 @@ class Verdict:
         if not self.values.pressure or not self.problem.zones or self.foreign.code:
             return ""
         if self.estimates.pressure_within is None:
-            return ", error of the pressure unknown"
+            return ", error of the pressure not estimated"
         return f", pressure within {percent(self.estimates.pressure_within)} (estimated)"
 
     def plain(self) -> dict[str, Any]:

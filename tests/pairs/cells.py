@@ -21,21 +21,17 @@ def halved(mesh: meshio.Mesh, body: str, beyond: float) -> meshio.Mesh:
     points, cells = mesh.points.copy(), list[tuple[str, np.ndarray]]()
     members = {name: list[np.ndarray]() for name in mesh.cell_sets}
     for number, block in enumerate(mesh.cells):
-        kind, mine = cell_type(block.type), np.zeros(len(block.data), dtype=bool)
-        mine[mesh.cell_sets[body][number]] = True
-        if kind.name in HALVES:
-            mine &= points[block.data].mean(axis=1)[:, 0] > beyond
-        else:
-            mine[:] = False
-        points, halves = _halves(points, kind, block.data[mine]) if mine.any() else (points, None)
-        kept = np.flatnonzero(~mine)
+        kind, numbers = cell_type(block.type), np.arange(len(block.data))
+        far = points[block.data].mean(axis=1)[:, 0] > beyond
+        cut = far & np.isin(numbers, mesh.cell_sets[body][number]) & (kind.name in HALVES)
         for name, sets in mesh.cell_sets.items():
-            members[name].append(np.flatnonzero(np.isin(kept, sets[number])))
-        cells.append((block.type, block.data[kept]))
-        if halves is not None:
+            members[name].append(np.flatnonzero(np.isin(numbers[~cut], sets[number])))
+        cells.append((block.type, block.data[~cut]))
+        if cut.any():
+            points, halves = _halves(points, kind, block.data[cut])
             cells.append((BY_NAME[HALVES[kind.name]].meshio, halves))
-            for name in mesh.cell_sets:
-                members[name].append(np.arange(len(halves) * (name == body)))
+            for name, of in members.items():
+                of.append(np.arange(len(halves) * (name == body)))
     return tidy(meshio.Mesh(points, cells, cell_sets=members), "pairs")
 
 

@@ -162,7 +162,7 @@ def test_without_neighbours_the_error_is_unknown():
     solution = solve_case(case)
     assert np.isnan(solution.solution.zones[0].pressure_error).all()
     assert solution.solution.pressure_error_estimate is None
-    assert "error of the pressure unknown" in str(solution)
+    assert "error of the pressure not estimated" in str(solution)
     beside = replace(solution.solution.zones[0], pressure_error=np.array([3.0]))
     some = replace(beside, multiplier=np.array([1e3]))
     assert pressure_error([some, solution.solution.zones[0]]) == pytest.approx(3e-3 / 50**0.5, 1e-2)

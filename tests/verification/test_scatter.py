@@ -213,7 +213,7 @@ def test_fits_and_rings_that_facets_break(inner, outer, slave, pushed):
     error = found.pressure - exact
     assert np.linalg.norm(error) / np.linalg.norm(exact + 0 * error) > 0.2
     assert found.verdict == "unreliable"
-    assert "error of the pressure unknown" in str(found)
+    assert "error of the pressure not estimated" in str(found)
 
 
 @pytest.mark.parametrize(

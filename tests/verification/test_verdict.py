@@ -171,7 +171,7 @@ def test_without_a_reference_a_solve_is_solved_and_not_verified(tmp_path):
     assert (verdict.verdict, verdict.passed, verdict.sound) == ("solved", False, True)
     assert verdict.summary == (
         "two-blocks: solved: not verified: compared with no reference, "
-        "error of the pressure unknown"
+        "error of the pressure not estimated"
     )
     # the counts of a mesh verify no solution
     counts = "counts: {bottom: {cells: 2}}\n"
