@@ -5,7 +5,9 @@ from pathlib import Path
 import meshio
 import numpy as np
 
+from solver.case.material import Material
 from solver.case.reader import load_case
+from solver.case.solutions.catalogue import SOLUTIONS
 from solver.simulation.results.records import Cost, Fields, Places, Quality, Scalars
 from solver.simulation.results.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
 
@@ -130,6 +132,13 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
             peak_memory_mb=1.0,
         ),
     )
+
+
+def uniform():
+    """The exact solution of the blocks of `plane`."""
+    steel = Material(2000.0, 0.3)
+    cls = SOLUTIONS["uniform_compression"]
+    return cls(pressure=25.0, base=-50.0, lower=steel, upper=steel, dim=2)
 
 
 def solid(folder: Path) -> Solution:

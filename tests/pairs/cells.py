@@ -4,7 +4,10 @@ import meshio
 import numpy as np
 
 from solver.lac.cells.catalogue import BY_NAME, CellType, cell_type
+from solver.lac.cells.faces import outer_faces
 from solver.mesh.tidy import tidy
+from solver.simulation.scene.groups import with_cells
+from solver.simulation.scene.holdings.rigid_surfaces import _with_cells
 
 from .options import HALVES
 
@@ -18,21 +21,17 @@ _TOUCHES = 1e-9
 
 def halved(mesh: meshio.Mesh, body: str, beyond: float) -> meshio.Mesh:
     """With cells of a body whose middle has a larger x in two halves each, upright in space."""
-    points, cells = mesh.points.copy(), list[tuple[str, np.ndarray]]()
-    members = {name: list[np.ndarray]() for name in mesh.cell_sets}
+    points, sets, halves, wanted = mesh.points, mesh.cell_sets[body], {}, []
     for number, block in enumerate(mesh.cells):
-        kind, numbers = cell_type(block.type), np.arange(len(block.data))
-        far = points[block.data].mean(axis=1)[:, 0] > beyond
-        cut = far & np.isin(numbers, mesh.cell_sets[body][number]) & (kind.name in HALVES)
-        for name, sets in mesh.cell_sets.items():
-            members[name].append(np.flatnonzero(np.isin(numbers[~cut], sets[number])))
-        cells.append((block.type, block.data[~cut]))
-        if cut.any():
-            points, halves = _halves(points, kind, block.data[cut])
-            cells.append((BY_NAME[HALVES[kind.name]].meshio, halves))
-            for name, of in members.items():
-                of.append(np.arange(len(halves) * (name == body)))
-    return tidy(meshio.Mesh(points, cells, cell_sets=members), "pairs")
+        kind, mine = cell_type(block.type), sets[number]
+        far = mesh.points[block.data].mean(axis=1)[:, 0] > beyond
+        cut = mine[far[mine]] if kind.name in HALVES else mine[:0]
+        if len(cut):
+            half = BY_NAME[HALVES[kind.name]].meshio
+            points, halves[half] = _halves(points, kind, block.data[cut])
+        sets[number] = np.setdiff1d(mine, cut)
+        wanted.append(~np.isin(np.arange(len(block.data)), cut))
+    return tidy(_with_cells(with_cells(mesh, wanted), points, body, halves), "pairs")
 
 
 def _halves(points: np.ndarray, kind: CellType, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -72,23 +71,11 @@ def _upright(points: np.ndarray, kind: CellType, cell: np.ndarray) -> list[int]:
 
 def bare(mesh: meshio.Mesh, body: str, name: str) -> meshio.Mesh:
     """Without the cells of a body; its faces at height zero are kept, in a group of that name."""
-    up, cells, faces = mesh.points[:, -1], list[tuple[str, np.ndarray]](), dict[str, list]()
-    members = {group: list[np.ndarray]() for group in mesh.cell_sets if group != body}
-    for number, block in enumerate(mesh.cells):
-        mine = np.zeros(len(block.data), dtype=bool)
-        mine[mesh.cell_sets[body][number]] = True
-        for face in cell_type(block.type).faces if mine.any() else ():
-            nodes = block.data[mine][:, list(face.nodes)]
-            there = (np.abs(up[nodes]) < _TOUCHES).all(axis=1)
-            faces.setdefault(BY_NAME[face.type].meshio, []).append(nodes[there])
-        kept = np.flatnonzero(~mine)
-        cells.append((block.type, block.data[kept]))
-        for group, of in members.items():
-            of.append(np.flatnonzero(np.isin(kept, mesh.cell_sets[group][number])))
-    members[name] = [np.empty(0, dtype=int)] * len(cells)
-    for kind, blocks in faces.items():
-        nodes = np.concatenate(blocks)
-        cells.append((kind, nodes))
-        for group, of in members.items():
-            of.append(np.arange(len(nodes) * (group == name)))
-    return tidy(meshio.Mesh(mesh.points, cells, cell_sets=members), "pairs")
+    blocks = list(zip(mesh.cells, mesh.cell_sets.pop(body), strict=True))
+    cells = [(cell_type(b.type).name, b.data[mine]) for b, mine in blocks if len(mine)]
+    faces = {}
+    for kind, nodes in outer_faces(cells):
+        there = (np.abs(mesh.points[nodes, -1]) < _TOUCHES).all(axis=1)
+        faces[BY_NAME[kind].meshio] = nodes[there]
+    others = [~np.isin(np.arange(len(b.data)), mine) for b, mine in blocks]
+    return tidy(_with_cells(with_cells(mesh, others), mesh.points, name, faces), "pairs")

@@ -45,8 +45,7 @@ class Places(States):
         shape = {
             "flat": 0 * x,
             "tilted": 0.2 * x,
-            "kinked": KINKS["kinked"] * np.abs(x - 0.5),
-            "edge": KINKS["edge"] * np.abs(x - 0.5),
+            **{name: slope * np.abs(x - 0.5) for name, slope in KINKS.items()},
             "curved": 0.1 * (4 * x * (1 - x) + y * (1 - y)),
         }[self.row["interface"]]
         points[:, -1] += shape * np.clip(1 - np.abs(z), 0, None)

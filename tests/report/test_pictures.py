@@ -10,8 +10,6 @@ import pytest
 
 from solver.case.acting import Load
 from solver.case.expressions import EXACT, Expression
-from solver.case.material import Material
-from solver.case.solutions.catalogue import SOLUTIONS
 from solver.lac.cells.faces import outer_faces
 from solver.mechanics.fem.faces import volume_cells
 from solver.report.case_picture import draw_case
@@ -235,9 +233,7 @@ def test_a_result_too_large_to_be_drawn_or_turned_says_so(tmp_path, monkeypatch)
 
 def test_what_is_given_by_a_solution_has_its_reference_in_every_zone(tmp_path):
     """The pressure of another zone has one only where the case says so."""
-    solution = handmade.plane(tmp_path)
-    cls, steel = SOLUTIONS["uniform_compression"], Material(2000.0, 0.3)
-    exact = cls(pressure=25.0, base=-50.0, lower=steel, upper=steel, dim=2)
+    solution, exact = handmade.plane(tmp_path), handmade.uniform()
     given = replace(solution.case.reference, values={"displacement": EXACT}, exact=exact)
     solution.case = replace(solution.case, zones=solution.case.zones * 2, reference=given)
     assert reference(solution, "displacement").exact is exact

@@ -11,7 +11,6 @@ import solver.verification.in_cells
 from solver.case.expressions import EXACT
 from solver.case.material import Material
 from solver.case.rigid import Rigid
-from solver.case.solutions.catalogue import SOLUTIONS
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.polynomial import Parabola2d, Paraboloid3d
 from solver.mesh import generate
@@ -21,7 +20,7 @@ from solver.studies.description import read_study
 from solver.studies.points import points_of
 from solver.verification.norms import errors, oscillation
 from solver.verification.run import mesh_of
-from tests.handmade import plane
+from tests.handmade import plane, uniform
 from tests.studies.measured import WORK
 
 UNIT = Material(1.0, 0.0)
@@ -30,11 +29,7 @@ UNIT = Material(1.0, 0.0)
 @pytest.fixture
 def handmade(tmp_path):
     """The two blocks by hand, exact to the last digit, and their solution."""
-    solution = plane(tmp_path)
-    cls = SOLUTIONS["uniform_compression"]
-    steel = Material(2000.0, 0.3)
-    exact = cls(pressure=25.0, base=-50.0, lower=steel, upper=steel, dim=2)
-    return with_exact(solution, exact)
+    return with_exact(plane(tmp_path), uniform())
 
 
 def with_exact(solution, exact):

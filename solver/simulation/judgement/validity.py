@@ -186,7 +186,8 @@ def _apart(scene: Scene) -> np.ndarray:
 
 def meshed(scene: Scene) -> dict[str, np.ndarray]:
     """The cells by type, without those that carry the motion of a surface."""
-    hidden = [scene.given.groups[name] for name in scene.given.surfaces]
+    frames = scene.held.frames.items()
+    hidden = [scene.given.groups[name] for name, frame in frames if frame.without_cells]
     kept = {}
     for kind, cells in scene.mesh.cells.items():
         parts = [scene.mesh.members(kind, group) for group in hidden]

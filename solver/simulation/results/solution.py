@@ -192,11 +192,8 @@ class ZoneResult:
     @property
     def pressure_error_estimate(self) -> np.ndarray:
         """The estimated root mean square error (m,) of each constant, a stress; NaN if unknown."""
-        unknown = np.full(len(self.area), np.nan)
-        if self.pressure_error is None:
-            return unknown
-        covered = self.area * self.coverage
-        return np.divide(self.pressure_error, np.sqrt(covered), out=unknown, where=covered > 0)
+        covered, unknown = self.area * self.coverage, np.full(len(self.area), np.nan)
+        return np.divide(_errors(self), np.sqrt(covered), out=unknown, where=covered > 0)
 
     @property
     def relative_pressure_error(self) -> float | None:

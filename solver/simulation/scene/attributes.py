@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from ...case.acting import Load
 from ...case.expressions import Exact
 from ...case.material import Material
 from ...case.solutions.base import ExactSolution
-from ...lac.cells.catalogue import BY_NAME, cell_type
+from ...lac.cells.catalogue import BY_NAME
 from ...lac.cells.faces import FaceBlock
 from ...lac.cells.shape import has_straight_edges
 from ...mechanics.fem.block import Block
@@ -28,7 +27,7 @@ from ...mechanics.fem.supports import (
 )
 from ...system.errors import InputError
 from .cut_groups import CutGroups
-from .groups import ALL, members_of
+from .groups import ALL
 from .holdings import holdings_of
 from .holdings.frame import Frame
 from .holdings.holding import Holding
@@ -122,19 +121,6 @@ class Attributes(CutGroups):
         from .holdings.rigid_surfaces import quadric_of
 
         return quadric_of(self.case, name, self.origin)
-
-    def surfaces_alone(self) -> list[str]:
-        """The rigid bodies that are surfaces, given by the case or the mesh.
-
-        Faces are in their groups beside the cells that carry their motion.
-        """
-        dim, sets = self.mesh.points.shape[1], self.mesh.cell_sets
-        faces = [cell_type(block.type).dim < dim for block in self.mesh.cells]
-        return [
-            name
-            for name in self.case.rigid
-            if any(map(len, members_of(compress(sets[name], faces))))
-        ]
 
     @cached_property
     def holdings(self) -> list[Holding]:

@@ -13,13 +13,11 @@ class GivenMesh:
     """The mesh before the cut.
 
     `cells`: the volume cells by type; `groups`: which of them (n,) each named group holds;
-    `surfaces`: the bodies whose cells carry the motion of a surface and are none by themselves;
     `unnamed`: how many groups of the mesh, and of its faces and edges, the case does not name.
     """
 
     cells: dict[str, np.ndarray]
     groups: dict[str, dict[str, np.ndarray]]
-    surfaces: list[str]
     unnamed: tuple[int, int]
 
 

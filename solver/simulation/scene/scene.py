@@ -228,7 +228,6 @@ def build_model(case: Case, mesh: meshio.Mesh, options: Options, clock: Clock) -
         given=GivenMesh(
             cells=volume_cells(mesh),
             groups={g: groups.whole_cell_mask(g) for g in mesh.cell_sets},
-            surfaces=groups.surfaces_alone(),
             unnamed=unnamed,
         ),
         # The master surface of a zone may be the slave surface of another, and cut.

@@ -11,12 +11,13 @@ class Frame:
     """A rigid body as it moves: its `nodes` (n,), and the unit motions (n, dim) there by component.
 
     Components are x, y, z and the turns rx, ry, rz by one radian about the reference `point`
-    (dim,).
+    (dim,). `without_cells`: it is a surface, and its cells only carry its motion.
     """
 
     nodes: np.ndarray
     point: np.ndarray
     motions: dict[str, np.ndarray]
+    without_cells: bool
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """The motions (n · dim, k) of k components."""

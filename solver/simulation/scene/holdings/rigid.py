@@ -63,14 +63,13 @@ class RigidBodies(Holding):
 
 def _frame(groups: CutGroups, name: str) -> Frame:
     body, nodes = groups.case.rigid[name], groups.nodes(name, f"bodies.{name}")
-    places = groups.points[nodes]
+    places, faces = groups.points[nodes], face_nodes(groups.mesh, name)
     if body.reference is not None:
         point = groups.carried(name, np.array(body.reference) - groups.origin)
     elif body.surface:
         given = np.array(body.values[MIDDLE[body.surface]])
         point = groups.carried(name, given - groups.origin)
     else:
-        faces = face_nodes(groups.mesh, name)
         own = groups.points[faces] if len(faces) else places
         point = (own.min(axis=0) + own.max(axis=0)) / 2
     arm, dim = places - point, places.shape[1]
@@ -81,7 +80,7 @@ def _frame(groups: CutGroups, name: str) -> Frame:
         motions |= {f"r{axis}": np.cross(e, arm) for axis, e in zip("xyz", np.eye(3), strict=True)}
     elif not groups.axisymmetric:
         motions["rz"] = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
-    return Frame(nodes, point, motions)
+    return Frame(nodes, point, motions, without_cells=len(faces) > 0)
 
 
 def _refuse_moved(case: Case, frames: Mapping[str, Frame], fixed: Mapping[str, Fixed]) -> None:
