@@ -9,7 +9,14 @@ from solver.case.material import Material
 from solver.case.reader import load_case
 from solver.case.solutions.catalogue import SOLUTIONS
 from solver.simulation.results.records import Cost, Fields, Places, Quality, Scalars
-from solver.simulation.results.solution import BodyInfo, Line, Solution, StepResult, ZoneResult
+from solver.simulation.results.solution import (
+    BodyInfo,
+    Line,
+    Solution,
+    StepResult,
+    ZoneResult,
+    ZoneSurfaces,
+)
 
 PLANE = """\
 name: two-blocks
@@ -67,7 +74,6 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
     zone = ZoneResult(
         name="interface",
         faces=[("SEG2", np.c_[slave[1:], slave[:-1]], np.repeat([0, 1], 3))],
-        master_faces=[("SEG2", np.c_[master[:-1], master[1:]])],
         centre=np.array([[12.5, 0.0], [37.5, 0.0]]),
         normal=np.array([[0.0, 1.0]] * 2),
         area=np.full(2, 25.0),
@@ -75,10 +81,7 @@ def plane(folder: Path, text: str = PLANE) -> Solution:
         gap=np.zeros(2),
         closed=np.ones(2, dtype=bool),
         coverage=np.ones(2),
-        stress_slave=np.full(7, -25.0),
-        stress_master=np.full(4, -25.0),
-        slave_nodes=slave,
-        master_nodes=master,
+        surfaces=surfaces([("SEG2", np.c_[master[:-1], master[1:]])], slave, master),
     )
     seen = {"zone": "interface", "macro_element": 0, "gap": 0.0, "status": 1, "coverage": 1.0}
     return Solution(
@@ -152,7 +155,6 @@ def solid(folder: Path) -> Solution:
     zone = ZoneResult(
         name="interface",
         faces=[("QUAD4", lower[None, :4], np.array([1])), ("TRIA3", triangles, np.zeros(4, int))],
-        master_faces=[("TRIA3", np.array([(8, 10, 9), (8, 11, 10)]))],
         centre=np.array([[5.0, 5.0, 0.0]] * 2),
         normal=np.array([[0.0, 0.0, 1.0]] * 2),
         area=np.full(2, 100.0),
@@ -160,10 +162,7 @@ def solid(folder: Path) -> Solution:
         gap=np.array([0.0, 0.5]),
         closed=np.array([True, False]),
         coverage=np.array([1.0, 0.75]),
-        stress_slave=np.full(5, -25.0),
-        stress_master=np.full(4, -25.0),
-        slave_nodes=lower,
-        master_nodes=upper,
+        surfaces=surfaces([("TRIA3", np.array([(8, 10, 9), (8, 11, 10)]))], lower, upper),
     )
     wedges = np.array([(8, 9, 10, 12, 13, 14), (8, 10, 11, 12, 14, 15)])
     return Solution(
@@ -199,6 +198,12 @@ def solid(folder: Path) -> Solution:
         cost=Cost(dofs=51, macro_elements=2, iterations=1, linear_solver="by hand"),
         plan=[],
     )
+
+
+def surfaces(master_faces, slave, master):
+    """Those of a zone with faces and nodes on its sides, pressed by 25."""
+    stress = (np.full(len(nodes), -25.0) for nodes in (slave, master))
+    return ZoneSurfaces(master_faces, *stress, slave, master)
 
 
 def _case(folder: Path, text: str):

@@ -24,10 +24,11 @@ def in_order(solution):
     """Tables of sub-faces and master faces have no order of their own; a type has one of these."""
     for zone in solution.zones:
         zone.faces.sort(key=lambda faces: faces[0])
-        joined = {kind: [] for kind in sorted(kind for kind, _ in zone.master_faces)}
-        for kind, nodes in zone.master_faces:
-            joined[kind].append(nodes)
-        zone.master_faces = [(kind, np.concatenate(nodes)) for kind, nodes in joined.items()]
+        given = zone.surfaces.master_faces
+        zone.surfaces.master_faces = [
+            (kind, np.concatenate([nodes for name, nodes in given if name == kind]))
+            for kind in sorted({kind for kind, _ in given})
+        ]
     return solution
 
 

@@ -253,7 +253,7 @@ class Compared:
     def _surface_stress(self, side: str) -> samples.Sampler:
         def sample(_: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
             placed = self._deformable("stress")
-            placed = placed.at(np.isin(placed.node, getattr(zone, f"{side}_nodes")))
+            placed = placed.at(np.isin(placed.node, getattr(zone.surfaces, f"{side}_nodes")))
             if not len(placed.places):
                 return None
             normals = self.model.normals(zone, side)[placed.node]

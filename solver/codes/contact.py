@@ -95,7 +95,7 @@ class SurfaceValues:
             return covered[self.numbers]
         if self.kind == "point":
             return covered[cKDTree(zone.centre).query(self.placed.places)[1]]
-        total, count = np.zeros((2, int(zone.slave_nodes.max()) + 1))
+        total, count = np.zeros((2, int(zone.surfaces.slave_nodes.max()) + 1))
         for _, nodes, macro in zone.faces:
             np.add.at(total, nodes, covered[macro][:, None])
             np.add.at(count, nodes, 1.0)
@@ -139,11 +139,11 @@ def surfaces(
             continue
         tolerance = NEAR * model.length
         face = None if placed.numbered else faces_at(model, zone, mine.places)
-        apart, node = cKDTree(model.points[zone.slave_nodes]).query(mine.places)
+        apart, node = cKDTree(model.points[zone.surfaces.slave_nodes]).query(mine.places)
         if face is not None:
             found.append(_at_faces(zone, mine, face, name))
         elif (apart < tolerance).all():
-            nodes = zone.slave_nodes[node]
+            nodes = zone.surfaces.slave_nodes[node]
             surface = _at_nodes(model, zone, mine, nodes, common, name, where)
             alone = ~where_zones_meet(model, number, mine.places)
             found.append(replace(surface, placed=mine.at(alone), numbers=nodes[alone]))
@@ -159,7 +159,7 @@ def _refuse_exchanged(
     size = np.abs(placed.values)
     if size[on].max(initial=0.0) > _NOTHING * size.max() or on.all():
         return
-    masters = [zone.master_nodes for zone in model.solution.zones]
+    masters = [zone.surfaces.master_nodes for zone in model.solution.zones]
     if name == "pressure" and np.isin(placed.node[size > 0], np.concatenate(masters)).any():
         problem = "is on the master surface: slave and master are exchanged (option --swap)"
         raise InputError(where, name, None, problem)
@@ -194,7 +194,7 @@ def _at_nodes(
         raise InputError(where, name, None, problem)
     if common.any():
         return surface
-    known = zone.slave_nodes if count[zone.slave_nodes].all() else vertices
+    known = zone.surfaces.slave_nodes if count[zone.surfaces.slave_nodes].all() else vertices
     nothing = np.zeros(len(known))
     nodal = NodalContact(known, mean[known], nothing, mean[known] > 0)
     filled = replace(zone, nodal=nodal)
@@ -314,8 +314,9 @@ def _zone(
         gap=none,
         closed=none > 0,
         coverage=np.ones(first),
-        slave_nodes=nodes,
-        stress_slave=np.full(len(nodes), np.nan),
+        surfaces=replace(
+            surface.zone.surfaces, slave_nodes=nodes, stress_slave=np.full(len(nodes), np.nan)
+        ),
         nodal=nodal,
     )
     return replace(zone, multiplier=at.means(computed_pressure(points, zone)))

@@ -16,7 +16,7 @@ from ..lac.cells.shape import shape_functions
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.records import Cost, Fields, Scalars
 from ..simulation.results.results import body_infos
-from ..simulation.results.solution import Solution, ZoneResult
+from ..simulation.results.solution import Solution, ZoneResult, ZoneSurfaces
 from ..simulation.scene.scene import Scene, ZoneScene, build_scene
 
 
@@ -110,7 +110,6 @@ class Model:
         return ZoneResult(
             name=zone.zone.name,
             faces=[(b.type.name, b.nodes, b.number) for b in zone.slave_faces],
-            master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
             centre=surface.centre + self.scene.coordinates.origin,
             normal=surface.normal,
             area=surface.area,
@@ -118,16 +117,18 @@ class Model:
             gap=none,
             closed=np.zeros(m, dtype=bool),
             coverage=surface.covered / surface.area,
-            stress_slave=np.full(len(slave), np.nan),
-            stress_master=np.full(len(master), np.nan),
-            slave_nodes=slave,
-            master_nodes=master,
+            surfaces=ZoneSurfaces(
+                master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
+                stress_slave=np.full(len(slave), np.nan),
+                stress_master=np.full(len(master), np.nan),
+                slave_nodes=slave,
+                master_nodes=master,
+            ),
         )
 
     def normals(self, zone: ZoneResult, side: str) -> np.ndarray:
         """Unit normals (n, dim) at the nodes of one side, zero elsewhere."""
-        faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
-        return nodal_normals(self.points, list(faces))
+        return nodal_normals(self.points, zone.faces_of(side))
 
     def middles(self, zone: ZoneResult) -> np.ndarray:
         """The middles (4, m, dim) of slave faces: of area, shapes, corners and all nodes."""

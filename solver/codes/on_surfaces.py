@@ -32,7 +32,7 @@ def where_zones_meet(model: Model, number: int, places: np.ndarray) -> np.ndarra
     """Which places (k,) of a zone are on another one too: a reference has one value there."""
     found = np.zeros(len(places), dtype=bool)
     for zone in (zone for i, zone in enumerate(model.solution.zones) if i != number):
-        faces = [(kind, nodes) for kind, nodes, _ in zone.faces]
+        faces = zone.faces_of("slave")
         for i in np.flatnonzero(_is_on(model, zone, places)):
             found[i] |= locate(model.points, faces, places[i])[0].distance < NEAR * model.length
     return found
@@ -43,7 +43,7 @@ def on_zones(model: Model, placed: Placed, sides: SurfaceCells | None) -> np.nda
     zones = model.solution.zones
     away = np.full((len(zones), len(placed.places)), np.inf)
     for number, zone in enumerate(zones):
-        nodes = zone.slave_nodes
+        nodes = zone.surfaces.slave_nodes
         mine = (placed.body < 0) | np.isin(placed.body, model.body[nodes])
         apart = _apart(model, zone, placed.places)
         if sides is not None:

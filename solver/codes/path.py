@@ -93,8 +93,7 @@ def _of_contact(model: Model) -> np.ndarray:
     """
     weight = np.zeros(len(model.points) + 1)
     for zone in model.solution.zones:
-        slave = [(kind, nodes) for kind, nodes, _ in zone.faces]
-        for _, nodes in (*slave, *zone.master_faces):
+        for _, nodes in (*zone.faces_of("slave"), *zone.faces_of("master")):
             np.add.at(weight, nodes, 1.0)
     return weight
 

@@ -171,8 +171,9 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
     flat, fields = laid.plan(solution.mesh.points), zone_fields(solution, zone)
     used = np.unique(np.concatenate([f.ravel() for _, f, _ in zone.faces]))
     faces = [(k, f[w], o[w]) for k, f, o in zone.faces for w in [laid.whole(flat[f])]]
-    masters = [(kind, f[laid.whole(flat[f])]) for kind, f in zone.master_faces]
-    zone = replace(zone, faces=faces, master_faces=masters)
+    masters = [(kind, f[laid.whole(flat[f])]) for kind, f in zone.surfaces.master_faces]
+    sides = replace(zone.surfaces, master_faces=masters)
+    zone = replace(zone, faces=faces, surfaces=sides)
     points, box = three(flat), pressed_box(flat, [zone], flat[used])
     names = (with_unit(laid.names[0], solution.case.about.units.get("length")), laid.names[1])
     pressure = next(iter(fields))
@@ -190,7 +191,7 @@ def _draw_plans(drawing: Drawing, solution: Solution, zone: ZoneResult) -> None:
     sub_faces = sum(len(nodes) for _, nodes, _ in zone.faces)
     kinds = ", ".join(sorted({cell_type(kind).name for kind, _, _ in zone.faces}))
     words = f"{zone.name}: macro-elements {len(zone.centre)}, sub-faces {sub_faces} ({kinds}), "
-    words += f"master faces {sum(len(f) for _, f in zone.master_faces)} (orange)"
+    words += f"master faces {sum(len(f) for _, f in zone.surfaces.master_faces)} (orange)"
     drawing.text(_PLANS[0][0], drawing.height - 24, words)
 
 
@@ -229,7 +230,7 @@ def _draw_sub_faces(
     view.faces(groups, lambda n, _: shade(n / LEVELS, colors), PAPER, both=True)
     outline = PAPER if colors is PRESSURE else MUTED
     view.lines(points[macro_edges(zone.faces)[:, :2]], outline, 1.6)
-    for kind, nodes in zone.master_faces:
+    for kind, nodes in zone.surfaces.master_faces:
         ring = outlines(points, kind, nodes)
         ring = view(ring[view.inside(ring, box)])
         view.drawing.polygons(ring, stroke=MASTER, stroke_width=0.8)

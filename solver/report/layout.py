@@ -161,8 +161,8 @@ def ways_apart(solution: Solution) -> np.ndarray:
     dim, names = solution.mesh.points.shape[1], [body.name for body in solution.bodies]
     found, moved = np.zeros((len(names), dim)), set[int]()
     for zone, given in zip(solution.zones, solution.case.zones, strict=True):
-        slaves = np.unique(solution.fields.body[zone.slave_nodes]).tolist()
-        masters = np.unique(solution.fields.body[zone.master_nodes]).tolist()
+        slaves = np.unique(solution.fields.body[zone.surfaces.slave_nodes]).tolist()
+        masters = np.unique(solution.fields.body[zone.surfaces.master_nodes]).tolist()
         if given.master in solution.case.rigid and given.master in names:
             masters = [names.index(given.master)]
         for body in {*masters} - {*slaves} - moved:

@@ -72,7 +72,7 @@ def parts(solution: Solution) -> Iterator[DrawnPart]:
         own = [(k, nodes[b == number], b[b == number]) for k, nodes, b in owners]
         yield DrawnPart(*look, points, moved, own, ways[number])
     for zone in solution.zones:
-        number = int(solution.fields.body[zone.slave_nodes[0]])
+        number = int(solution.fields.body[zone.surfaces.slave_nodes[0]])
         look = (f"{zone.name}: slave faces", "slave", BLUE, mixed(BLUE, PAPER, 0.8), number)
         yield DrawnPart(*look, points, moved, zone.faces, ways[number], zone)
 

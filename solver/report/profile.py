@@ -228,8 +228,8 @@ def _of_nodes(
     if zone.recovered and not flat:
         given.append((RECOVERED, zone.recovered.nodes, zone.recovered.at_nodes))
     if flat:
-        given.append((SLAVE, zone.slave_nodes, -zone.stress_slave))
-        given.append((MASTER, zone.master_nodes, -zone.stress_master))
+        given.append((SLAVE, zone.surfaces.slave_nodes, -zone.surfaces.stress_slave))
+        given.append((MASTER, zone.surfaces.master_nodes, -zone.surfaces.stress_master))
     points, found = solution.mesh.points, []
     for name, nodes, values in given:
         found += _records(name, s=place(points[nodes]), p=values)

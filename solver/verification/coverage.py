@@ -35,7 +35,7 @@ def _passed_by(solution: Solution, zone: ZoneResult) -> np.ndarray:
     half the angle θ to the next facet. Over a distance g it moves there by g tan(θ/2).
     """
     tangent = np.zeros(len(zone.area))
-    if zone.meshed_gap is None or zone.flat:
+    if zone.surfaces.meshed_gap is None or zone.flat:
         return tangent
     pairs, rim = macro_neighbours(zone)
     one, other = pairs.T
@@ -43,7 +43,7 @@ def _passed_by(solution: Solution, zone: ZoneResult) -> np.ndarray:
     lean /= np.linalg.norm(zone.normal[one] + zone.normal[other], axis=1)
     np.maximum.at(tangent, one, lean)
     np.maximum.at(tangent, other, lean)
-    moved = _WARPED * tangent * rim * np.abs(zone.meshed_gap)
+    moved = _WARPED * tangent * rim * np.abs(zone.surfaces.meshed_gap)
     return moved / _shortest_side(solution.mesh.points, zone)
 
 

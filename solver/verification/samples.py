@@ -72,7 +72,8 @@ def pressure(solution: Solution, zone: ZoneResult, reference: Reference) -> Samp
 
 def pressure_of_forces(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample:
     """The pressure by forces at slave nodes; the multiplier where they do not determine it."""
-    found = zone.multiplier if zone.pressure_of_forces is None else zone.pressure_of_forces
+    known = zone.estimates.pressure_of_forces
+    found = zone.multiplier if known is None else known
     return _at_macro_elements(found, reference_where_covered(solution, zone, reference))
 
 
@@ -154,11 +155,11 @@ def surface_stress(side: str) -> Sampler:
     """Sample the normal stress on one surface of a zone; None on a rigid body."""
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
-        nodes, values = getattr(zone, f"{side}_nodes"), getattr(zone, f"stress_{side}")
+        nodes, values = (getattr(zone.surfaces, k) for k in (f"{side}_nodes", f"stress_{side}"))
         if len(nodes) and not solution.deformable[nodes].any():
             return None
         if isinstance(reference, ExactValues):
-            faces = zone.master_faces if side == "master" else [face[:2] for face in zone.faces]
+            faces = zone.faces_of(side)
             expected = reference.surface_stress(nodes, faces)
         else:
             expected = evaluate(reference, solution.mesh.points[nodes])
@@ -282,7 +283,6 @@ def _apart(solution: Solution) -> bool:
     """Whether surfaces are apart, or overlap, before anything acts."""
     if any(zone.interference or zone.clearance is not None for zone in solution.case.zones):
         return True
-    gaps = (zone.meshed_gap for zone in solution.zones if zone.meshed_gap is not None)
-    return (
-        max((np.abs(gap).max() for gap in gaps), default=0.0) > _TOUCHING * solution.scalars.length
-    )
+    gaps = (zone.surfaces.meshed_gap for zone in solution.zones)
+    most = max((np.abs(gap).max() for gap in gaps if gap is not None), default=0.0)
+    return bool(most > _TOUCHING * solution.scalars.length)

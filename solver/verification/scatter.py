@@ -75,7 +75,7 @@ def _remedies(solution: Solution, zone: Zone, result: ZoneResult) -> str:
     """What the case admits of: a rigid side is always master, friction has no stabilised form."""
     lac, cells = zone.treatment == "lac", {c for b in solution.bodies for c in b.cells}
     admitted = {
-        "exchange slave and master": solution.deformable[result.master_nodes].any(),
+        "exchange slave and master": solution.deformable[result.surfaces.master_nodes].any(),
         "set `stabilised: true`": lac and not zone.friction and not zone.gives_way,
         "cut with `hexahedra: hexahedra`": lac
         and zone.hexahedra != "hexahedra"

@@ -10,7 +10,7 @@ import numpy as np
 from ..mechanics.mortar.edge import Edges
 from ..mesh.files.vtkhdf import column, read_table, write_table
 from ..simulation.results.forces import ProbeResult, Reaction, Resultants, RigidMotion
-from ..simulation.results.solution import StepResult, ZoneResult
+from ..simulation.results.solution import StepResult, ZoneEstimates, ZoneResult, ZoneSurfaces
 
 _OF_STEP = (
     *("factor", "iterations", "status_changes", "residual", "complementarity"),
@@ -124,11 +124,12 @@ _PARTS: dict[str, Any] = {
 def write_zone(group: h5py.Group, zone: ZoneResult, number: int) -> None:
     """Write a zone, the `number` of which gives its place among all."""
     group.attrs["number"] = number
-    _write(group, zone)
-    faces = group.create_group("master_faces")
+    for record in (zone, zone.surfaces, zone.estimates):
+        _write(group, record)
+    faces, masters = group.create_group("master_faces"), zone.surfaces.master_faces
     # Faces of one type may be in several blocks, one for each type of cell behind them.
-    for kind in dict.fromkeys(kind for kind, _ in zone.master_faces):
-        faces[kind] = np.concatenate([nodes for name, nodes in zone.master_faces if name == kind])
+    for kind in dict.fromkeys(kind for kind, _ in masters):
+        faces[kind] = np.concatenate([nodes for name, nodes in masters if name == kind])
     for name in _PARTS:
         if part := getattr(zone, name):
             _write(group.create_group(name), part)
@@ -150,7 +151,11 @@ def read_zone(
     if "edges" in group:
         parts["resultants"].edges = _read(Edges, group["edges"])
     masters = [(kind, data[()]) for kind, data in group["master_faces"].items()]
-    return _read(ZoneResult, group, name=name, faces=faces, master_faces=masters, **parts)
+    parts |= {
+        "surfaces": _read(ZoneSurfaces, group, master_faces=masters),
+        "estimates": _read(ZoneEstimates, group),
+    }
+    return _read(ZoneResult, group, name=name, faces=faces, **parts)
 
 
 def _write(group: h5py.Group, item: Any) -> None:

@@ -81,7 +81,7 @@ def test_where_zones_meet_a_value_at_a_node_is_of_neither(name, table):
     case, model, exact = pressures(f"shared/{name}")
     values = np.full(len(model.points), np.nan)
     for zone, pressure in zip(model.solution.zones, exact, strict=True):
-        values[zone.slave_nodes] = pressure[0]
+        values[zone.surfaces.slave_nodes] = pressure[0]
     nodes = np.flatnonzero(np.isfinite(values))
     given = Field(places=model.points[nodes], values=values[nodes], nodes=None if table else nodes)
     result = ForeignResult(code="mine", mesh=None if table else model.mesh, pressure=given)

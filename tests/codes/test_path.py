@@ -39,7 +39,7 @@ def as_foreign(case, mesh):
         return Field(places=mesh.points[of], values=values, nodes=of)
 
     zone, whole = solution.zones[0], solution.displacement + solution.fields.motion
-    slave = zone.slave_nodes[zone.slave_nodes < count]
+    slave = zone.surfaces.slave_nodes[zone.surfaces.slave_nodes < count]
     # the master is on x from 40 to 50 in the end
     pressed = 25.0 * (solution.mesh.points[slave, 0] > 40.0 - 1e-6)
     return ForeignResult(

@@ -275,8 +275,9 @@ def test_a_profile_in_space_has_two_marks_for_each_macro_element(tmp_path):
 def test_a_profile_of_multipliers_at_nodes_has_a_mark_for_each(tmp_path):
     solution = handmade.plane(tmp_path)
     zone = solution.zones[0]
-    n = len(zone.slave_nodes)
-    zone.nodal = NodalContact(zone.slave_nodes, np.linspace(24.0, 29.0, n), *np.zeros((2, n)))
+    nodes = zone.surfaces.slave_nodes
+    n = len(nodes)
+    zone.nodal = NodalContact(nodes, np.linspace(24.0, 29.0, n), *np.zeros((2, n)))
     found, _, _ = drawn(solution)
     assert sorted(r["p"] for r in found[NODES]) == pytest.approx(np.linspace(24.0, 29.0, n))
     assert len(found[MEANS]) == 2
@@ -294,8 +295,8 @@ def test_a_recovered_pressure_is_a_line_within_each_face(tmp_path):
         centre=zone.centre,
         axes=np.tile([[[1 / 25, 0.0]]], (2, 1, 1)),
         spread=np.full((2, 1, 1), 1 / 12),
-        nodes=zone.slave_nodes,
-        at_nodes=np.zeros(len(zone.slave_nodes)),
+        nodes=zone.surfaces.slave_nodes,
+        at_nodes=np.zeros(len(zone.surfaces.slave_nodes)),
     )
     records = drawn(solution)[0][RECOVERED]
     assert len({r["face"] for r in records}) == 6

@@ -60,7 +60,8 @@ def error_over_estimate(sweep, mesh, value, young=2000.0, refine=1, state="compr
     found = simulate(
         case, transform(raw, case.mesh.transform, "test") if case.mesh.transform else raw
     )
-    stress = exact.stress_at(found.fields.body == found.fields.body[found.zones[0].master_nodes[0]])
+    master = found.zones[0].surfaces.master_nodes[0]
+    stress = exact.stress_at(found.fields.body == found.fields.body[master])
     errors = [np.abs(zone.multiplier / exact.pressure - 1).max() for zone in found.zones]
     errors.append(np.abs(found.stress - stress).max() / exact.pressure)
     return max(errors) / Accuracy(found.quality.accuracy).estimate

@@ -157,7 +157,7 @@ def test_a_heated_block_between_walls_presses_on_the_other(plane, pair, counts, 
     """Both shorten by p/E (p (1 − ν²)/E in plane strain) and take what the upper one expands."""
     found, pressure = between_walls(plane, pair, swapped, counts), WALLS[plane]
     assert np.abs(found.zones[0].multiplier / pressure - 1).max() < 1e-12
-    assert np.abs(found.zones[0].pressure_of_forces / pressure - 1).max() < 1e-12
+    assert np.abs(found.zones[0].estimates.pressure_of_forces / pressure - 1).max() < 1e-12
     assert max(found.quality.balance.values()) < 1e-12
     across = np.delete(found.stress, 1 if plane else 2, axis=1)
     along = found.stress[:, 1 if plane else 2]

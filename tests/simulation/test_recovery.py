@@ -18,7 +18,7 @@ from solver.lac.reconstruction import FORMS
 from solver.lac.recovery import Recovery
 from solver.mesh import generate
 from solver.simulation.equilibrium import recovery as sweeps
-from solver.simulation.results.solution import pressure_error
+from solver.simulation.results.solution import ZoneEstimates, pressure_error
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -160,10 +160,10 @@ def test_without_neighbours_the_error_is_unknown():
     case = waves("QUAD8", "QUAD8", 40, "linear")
     case["mesh"]["bottom"]["divisions"] = [1, 1]
     solution = solve_case(case)
-    assert np.isnan(solution.solution.zones[0].pressure_error).all()
+    assert np.isnan(solution.solution.zones[0].estimates.pressure_error).all()
     assert solution.solution.pressure_error_estimate is None
     assert "error of the pressure not estimated" in str(solution)
-    beside = replace(solution.solution.zones[0], pressure_error=np.array([3.0]))
+    beside = replace(solution.solution.zones[0], estimates=ZoneEstimates(None, np.array([3.0])))
     some = replace(beside, multiplier=np.array([1e3]))
     assert pressure_error([some, solution.solution.zones[0]]) == pytest.approx(3e-3 / 50**0.5, 1e-2)
 
@@ -318,7 +318,7 @@ def test_a_recovered_pressure_is_read_back(tmp_path):
     assert back.recovered.form == "quadratic"
     for name in ("coefficients", "degree", "centre", "axes", "spread", "nodes", "at_nodes"):
         assert (getattr(back.recovered, name) == getattr(zone.recovered, name)).all()
-    assert (back.pressure_error == zone.pressure_error).all()
+    assert (back.estimates.pressure_error == zone.estimates.pressure_error).all()
     with h5py.File(tmp_path / "r.vtkhdf") as file:
         grid = file["VTKHDF"]
         at_nodes = grid["PointData/recovered_pressure"][()]

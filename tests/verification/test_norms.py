@@ -20,7 +20,7 @@ from solver.studies.description import read_study
 from solver.studies.points import points_of
 from solver.verification.norms import errors, oscillation
 from solver.verification.run import mesh_of
-from tests.handmade import plane, uniform
+from tests.handmade import plane, surfaces, uniform
 from tests.studies.measured import WORK
 
 UNIT = Material(1.0, 0.0)
@@ -155,7 +155,6 @@ def line(n: int, low: float, high: float, pressure) -> ZoneResult:
     return ZoneResult(
         name="line",
         faces=[("SEG2", np.c_[nodes[:-1], nodes[1:]][shuffled], macro[shuffled])],
-        master_faces=[],
         centre=centre,
         normal=np.tile([0.0, 1.0], (n, 1)),
         area=np.full(n, (high - low) / n),
@@ -163,10 +162,7 @@ def line(n: int, low: float, high: float, pressure) -> ZoneResult:
         gap=np.zeros(n),
         closed=np.ones(n, dtype=bool),
         coverage=np.ones(n),
-        stress_slave=np.empty(0),
-        stress_master=np.empty(0),
-        slave_nodes=np.empty(0, dtype=int),
-        master_nodes=np.empty(0, dtype=int),
+        surfaces=surfaces([], *np.empty((2, 0), dtype=int)),
     )
 
 

@@ -55,7 +55,7 @@ def test_faces_of_one_type_on_cells_of_two_types(tmp_path):
     solution = simulate(block_case(2), mixed)
     path = tmp_path / "result.vtkhdf"
     write_result(path, solution, [], {})
-    (faces,) = read_result(path).solution.zones[0].master_faces
+    (faces,) = read_result(path).solution.zones[0].surfaces.master_faces
     assert (faces[0], faces[1].shape) == ("SEG2", (2, 2))
     assert max(errors(solution).values()) < 1e-12
 

@@ -304,7 +304,7 @@ def test_a_verdict_says_how_strict_its_tolerances_are(tmp_path):
 def test_the_line_of_a_verdict_has_the_expected_error(tmp_path):
     solution = plane(tmp_path)
     solution.zones[0].multiplier[0] += 25 * 1.2e-3
-    solution.zones[0].pressure_of_forces = np.array([25.0, 25.0])
+    solution.zones[0].estimates.pressure_of_forces = np.array([25.0, 25.0])
     fitted = judged(solution, {"all": 1e-2, "multiplier": 1.5e-3}, {"multiplier": 1e-3})
     assert fitted.summary.startswith(
         "two-blocks: passed, largest checked error 1.2e-03 (multiplier), expected 1.0e-03, "

@@ -64,7 +64,7 @@ def _numbers(name: str, item: Any) -> Iterator[tuple[str, Any]]:
 
 def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     """Whether p ≥ 0, ḡ ≥ 0 and p ḡ = 0, on the scales of the zone's own stress and displacement."""
-    nodes = np.union1d(zone.slave_nodes, zone.master_nodes)
+    nodes = np.union1d(zone.surfaces.slave_nodes, zone.surfaces.master_nodes)
     moved, contact = solution.displacement[nodes], zone.nodal or zone
     own = float(np.abs(contact.multiplier).max(initial=0.0))
     scale = max(own, float(np.abs(solution.stress[nodes]).max(initial=0.0)))

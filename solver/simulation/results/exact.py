@@ -127,7 +127,7 @@ class ExactValues:
 
     def _side(self, zone: ZoneResult) -> float:
         """1 where the slave is the first part, else −1."""
-        return 1.0 if self.part[zone.slave_nodes[0]] == 0 else -1.0
+        return 1.0 if self.part[zone.surfaces.slave_nodes[0]] == 0 else -1.0
 
     def ends_within(self, zone: ZoneResult) -> np.ndarray:
         """Which macro-elements (m,) the contact area covers in part only."""

@@ -34,7 +34,9 @@ from .solution import (
     NodalContact,
     Solution,
     StepResult,
+    ZoneEstimates,
     ZoneResult,
+    ZoneSurfaces,
 )
 
 # Half, up to round-off.
@@ -144,7 +146,6 @@ def _zone_result(
     return ZoneResult(
         name=zone.zone.name,
         faces=[(f.type.name, f.nodes, f.macro) for f in zone.sub_faces],
-        master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
         centre=surface.centre + scene.coordinates.origin,
         normal=surface.normal,
         area=surface.area,
@@ -152,14 +153,16 @@ def _zone_result(
         gap=zone.by_macro_element(state.gap),
         closed=closed_of(zone, state),
         coverage=surface.covered / surface.area,
-        stress_slave=normal_stress(stress[slave_nodes], slave_normal),
-        stress_master=normal_stress(stress[master_nodes], master_normal),
-        slave_nodes=slave_nodes,
-        master_nodes=master_nodes,
+        surfaces=ZoneSurfaces(
+            master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
+            stress_slave=normal_stress(stress[slave_nodes], slave_normal),
+            stress_master=normal_stress(stress[master_nodes], master_normal),
+            slave_nodes=slave_nodes,
+            master_nodes=master_nodes,
+            meshed_gap=_meshed_gap(scene, zone),
+        ),
+        estimates=ZoneEstimates(pressure_of_forces, None if field is None else field.error),
         nodal=_nodal_contact(zone, state),
-        pressure_of_forces=pressure_of_forces,
-        meshed_gap=_meshed_gap(scene, zone),
-        pressure_error=None if field is None else field.error,
         recovered=recovered_pressure(scene, zone, state),
         resultants=step.resultants[zone.zone.name],
         friction=zone_friction(zone, state) if zone.slips and state.friction else None,
@@ -275,7 +278,7 @@ def probed(
 
 def _on_surface(scene: Scene, zone: ZoneResult, name: str, places: np.ndarray) -> ProbeResult:
     """The contact pressure where a zone's slave surface is nearest to local places (k, dim)."""
-    pressure, faces = np.empty(len(places)), [(kind, nodes) for kind, nodes, _ in zone.faces]
+    pressure, faces = np.empty(len(places)), zone.faces_of("slave")
     points = scene.points + scene.coordinates.origin
     for i, face in enumerate(faces_at(scene, name, faces)):
         owner = zone.faces[face.block][2][face.number]

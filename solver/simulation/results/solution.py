@@ -128,27 +128,50 @@ class ZoneFriction:
 
 
 @dataclass
+class ZoneSurfaces:
+    """The two surfaces of a zone.
+
+    `master_faces`: (type, connectivity). `stress_slave` and `stress_master` hold n·σ·n at
+    `slave_nodes` and `master_nodes`, taken from the body of that surface alone. `meshed_gap` (m,)
+    is their mean distance as they are meshed, None in results of other codes.
+    """
+
+    master_faces: list[tuple[str, np.ndarray]]
+    stress_slave: np.ndarray
+    stress_master: np.ndarray
+    slave_nodes: np.ndarray
+    master_nodes: np.ndarray
+    meshed_gap: np.ndarray | None = None
+
+
+@dataclass
+class ZoneEstimates:
+    """How well the pressure of a zone is known, by macro-element (m,).
+
+    `pressure_of_forces` is the pressure by the internal forces at the slave nodes; None where these
+    do not determine it (see `results.balance`). `pressure_error` estimates the L2 error of the
+    multiplier, by its distance from a reconstruction p*; NaN where no neighbours determine that,
+    None where multipliers belong to nodes.
+    """
+
+    pressure_of_forces: np.ndarray | None = None
+    pressure_error: np.ndarray | None = None
+
+
+@dataclass
 class ZoneResult:
-    """The contact state of one zone, by macro-element, and the stress on both surfaces.
+    """The contact state of one zone, by macro-element, and its surfaces.
 
     `faces`: the slave sub-faces by cell type: (type, connectivity (s, nodes) into the mesh's
-    points, macro-element number (s,)); `master_faces`: (type, connectivity). `centre` and `normal`
-    (m, dim), `area`, `multiplier` (pressure ≥ 0), `gap`, `closed` (bool) and `coverage`
-    (intersected over whole area) are (m,); `meshed_gap` (m,), the mean distance of the surfaces as
-    they are meshed, is None in results of other codes. `stress_slave` and `stress_master` hold
-    n·σ·n at `slave_nodes` and `master_nodes`, taken from the body of that surface alone. Where
-    multipliers belong to nodes, `nodal` has them, and the values by macro-element are averages of
-    theirs. `pressure_of_forces` (m,) is the pressure by the internal forces at the slave nodes;
-    None where these do not determine it (see `results.balance`). `pressure_error` (m,) estimates
-    the L2 error of the multiplier on each macro-element, by its distance from a reconstruction p*;
-    NaN where no neighbours determine that, None where multipliers belong to nodes. `recovered` is
-    p* where the case asks for one.
+    points, macro-element number (s,)). `centre` and `normal` (m, dim), `area`, `multiplier`
+    (pressure ≥ 0), `gap`, `closed` (bool) and `coverage` (intersected over whole area) are (m,).
+    Where multipliers belong to nodes, `nodal` has them, and the values by macro-element are
+    averages of theirs. `recovered` is the reconstruction p* where the case asks for one.
     `resultants`: area, force, moment and edges of contact. `friction`: see there; None without.
     """
 
     name: str
     faces: list[tuple[str, np.ndarray, np.ndarray]]
-    master_faces: list[tuple[str, np.ndarray]]
     centre: np.ndarray
     normal: np.ndarray
     area: np.ndarray
@@ -156,17 +179,18 @@ class ZoneResult:
     gap: np.ndarray
     closed: np.ndarray
     coverage: np.ndarray
-    stress_slave: np.ndarray
-    stress_master: np.ndarray
-    slave_nodes: np.ndarray
-    master_nodes: np.ndarray
+    surfaces: ZoneSurfaces
+    estimates: ZoneEstimates = field(default_factory=ZoneEstimates)
     nodal: NodalContact | None = None
-    pressure_of_forces: np.ndarray | None = None
-    meshed_gap: np.ndarray | None = None
-    pressure_error: np.ndarray | None = None
     recovered: RecoveredPressure | None = None
     resultants: Resultants | None = None
     friction: ZoneFriction | None = None
+
+    def faces_of(self, side: str) -> list[tuple[str, np.ndarray]]:
+        """The faces (type, connectivity) of the slave or the master surface."""
+        if side == "master":
+            return self.surfaces.master_faces
+        return [(kind, nodes) for kind, nodes, _ in self.faces]
 
     @property
     def flat(self) -> bool:
@@ -208,7 +232,7 @@ def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
     """
     scale = max((float(zone.multiplier.max(initial=0.0)) for zone in zones), default=0.0)
     if not scale > 0:
-        return 0.0 if any(zone.pressure_error is not None for zone in zones) else None
+        return 0.0 if any(zone.estimates.pressure_error is not None for zone in zones) else None
     errors = np.concatenate([_errors(zone) for zone in zones]) / scale
     whole = np.concatenate([z.area * z.coverage * (z.multiplier / scale) ** 2 for z in zones])
     known = np.isfinite(errors)
@@ -219,9 +243,9 @@ def pressure_error(zones: Sequence[ZoneResult]) -> float | None:
 
 def _errors(zone: ZoneResult) -> np.ndarray:
     """Its `pressure_error` (m,), NaN where that is unknown."""
-    if zone.pressure_error is None:
+    if zone.estimates.pressure_error is None:
         return np.full(len(zone.area), np.nan)
-    return zone.pressure_error
+    return zone.estimates.pressure_error
 
 
 @dataclass
