@@ -275,7 +275,7 @@ class LocalAverageContact:
         force = checked_vector(f, size, "f")
         system = SaddlePoint(self, stiffness, force, B, imposed, held, ground)
         opposed = self._opposed
-        found = find_status(system.trial, opposed, opposed, self.area, system.stiffness)
+        found = find_status(system.trial, opposed, opposed, self.covered, system.stiffness)
         return _state(system, found.closed, found.iterations)
 
     def recover(self, state: ContactState, form: Recovered = "automatic") -> RecoveredState:
@@ -314,8 +314,8 @@ class LocalAverageContact:
 
         def again(found: _UnderRecovery) -> np.ndarray:
             system, opposed = found.system, self._opposed
-            status = find_status(system.trial, found.closed, opposed, self.area, system.stiffness)
-            return status.closed
+            start, covered = found.closed, self.covered
+            return find_status(system.trial, start, opposed, covered, system.stiffness).closed
 
         settled = with_status(closed, correct, wrong, again)
         if settled is None:

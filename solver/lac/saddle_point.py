@@ -138,10 +138,11 @@ class SaddlePoint:
 
     def stiffness(self) -> np.ndarray:
         """The forces (e, e) on eligible facets that their average gaps bring up, one at a time."""
-        covered, area, eligible = self.contact.covered, self.contact.area, self.contact._opposed
+        eligible = self.contact._opposed
+        covered = self.contact.covered[eligible]
         factor, _ = self._factor(eligible)
         count = int(eligible.sum())
         right = np.zeros((len(self.free) + count, count))
-        right[len(self.free) :] = self.scale * np.diag(covered[eligible])
+        right[len(self.free) :] = self.scale * np.diag(covered)
         pressure = -self.scale * factor.solve(right)[len(self.free) :]
-        return np.asarray(area[eligible][:, None] * pressure)
+        return np.asarray(covered[:, None] * pressure)

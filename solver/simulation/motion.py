@@ -220,9 +220,10 @@ def _solution(
                 turned = _turned(problem.scene, zone.name, old.friction.slip_total, groups, last)
                 zone.friction.slip_total = zone.friction.slip + turned
     step.work = float((force * path).sum() / 2)
-    for name, probe in found.places.probes.items():
-        moved = place.displacement[problem.scene.named.probed[name]]
-        found.places.probes[name] = replace(probe, displacement=moved)
+    for name, nodes in problem.scene.named.probed.items():
+        if not problem.scene.case.probes[name].zone:
+            probe = found.places.probes[name]
+            found.places.probes[name] = replace(probe, displacement=place.displacement[nodes])
     return found
 
 

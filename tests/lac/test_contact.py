@@ -130,6 +130,21 @@ def test_contact_opens_and_carries_the_load():
     assert 0 < np.abs(recovered.pressure - state.pressure).max() < 0.2 * state.pressure.max()
 
 
+def test_a_status_that_is_not_found_step_by_step_is_that_of_the_complementarity(monkeypatch):
+    """Also where the last facet is covered by a third."""
+    lower, upper = block(skfem.MeshQuad1, 2, 8, 0.0), block(skfem.MeshQuad1, 2, 12, 25.0)
+    contact = LocalAverageContact(
+        slave=(upper.translated((2.8, 0.0)), "bottom"), master=(lower, "top")
+    )
+    assert (contact.covered / contact.area)[[0, -1]] == pytest.approx([1.0, 0.328])
+    state, *_ = pressed(contact, lower, 2, lambda x: 100.0 * (x[0] > 40))
+    monkeypatch.setattr("solver.lac.status._Search.ended", True)
+    other, *_ = pressed(contact, lower, 2, lambda x: 100.0 * (x[0] > 40))
+    assert 1 < state.closed.sum() < 12
+    assert (other.closed == state.closed).all()
+    assert state.closed[-1]
+
+
 def test_a_given_gap_takes_the_place_of_the_meshed_one():
     lower, upper = block(skfem.MeshQuad1, 2, 2, 0.0), block(skfem.MeshQuad1, 2, 3, 25.0)
     both = (upper, "bottom"), (lower, "top")

@@ -18,22 +18,24 @@ _COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1,
 
 
 def references(places: Places) -> dict[str, Any]:
-    """The keys of the case file; none where the state has no value for all of its bodies."""
+    """The keys of the case file."""
     stiff = places.row["materials"] == "stiff master"
     given = _of_zones(places) | _of_bodies(places, stiff)
-    if not given:
-        return {}
     tolerance = STIFF if stiff else TOLERANCE
     of_check = dict.fromkeys(("all", "element_gap", "balance"), tolerance)
     seen = [{"zone": "one", "nearest": _place(places, 0.0)}]
     seen += [{"zone": "two", "nearest": _place(places, 1.0)}] * places.second
     text: dict[str, Any] = {
-        "reference": {"kind": "analytical"} | given,
+        "reference": {"kind": "analytical"} | {k: v for k, v in given.items() if v != {}},
         "observe": seen,
         "tolerance": of_check | dict.fromkeys(("coverage", "covered_pressure"), _COVERAGE),
     }
-    if "displacement_at" in given:
-        text["probes"] = {name: {"at": _within(places, name)} for name in given["displacement_at"]}
+    text["probes"] = {name: {"at": _within(places, name)} for name in given["displacement_at"]}
+    text["probes"]["base"] = {"group": "lower-base"}
+    slaves = {"one": "upper-under", "two": "upper-top"} if places.row["form"] == "exchanged" else {}
+    for name in given["pressure_at"]:
+        group = slaves.get(name) or {"one": "lower-top", "two": "cap-under"}[name]
+        text["probes"][name] = {"group": group, "zone": name}
     return text
 
 
@@ -59,7 +61,8 @@ def _of_zones(places: Places) -> dict[str, Any]:
     normal = np.eye(dim)[-1] if shaped else places.normal
     pressed = [0.0 if places.open else -float(normal @ lower @ normal)]
     pressed += [-float(last[-1, -1])] * places.second
-    given: dict[str, Any] = {}
+    given: dict[str, Any] = {"pressure_at": dict(zip(("one", "two"), pressed, strict=False))}
+    given["pressure_at"] = {name: factor * p for name, p in given["pressure_at"].items()}
     if np.ptp(pressed) <= 1e-12 * max(pressed):
         given["contact_pressure"] = factor * pressed[0]
     if not (places.second and places.open):
@@ -91,10 +94,11 @@ def _of_bodies(places: Places, stiff: bool) -> dict[str, Any]:
     same = all(np.allclose(s, stress[0], atol=1e-12 * np.abs(stress[0]).max()) for s in stress)
     if same and not stiff:
         given["stress"] = _turned(places, stress[0])
-    if row["motion"] == "small" and row["form"] != "perturbed":
-        still = [body for body in bodies if body is bodies[0] or not places.apart.any()]
-        given["displacement_at"] = {body.name: _moved(places, body) for body in still}
-        given["stress_at"] = {body.name: _turned(places, body.stress) for body in still}
+    still = [body for body in bodies if body is bodies[0] or not places.apart.any()]
+    still = still if row["motion"] == "small" and row["form"] != "perturbed" else []
+    given["displacement_at"] = {body.name: _moved(places, body) for body in still}
+    given["stress_at"] = {body.name: _turned(places, body.stress) for body in still}
+    given["stress_at"]["base"] = _turned(places, bodies[0].stress)
     if places.axisymmetric or row["interface"] != "flat" or row["form"] == "exchanged":
         return given
     size, factor = places.placed.scale, places.factor
