@@ -28,7 +28,7 @@ from .cells.neighbours import vertex_neighbours
 from .errors import SolveError
 from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
-from .operator import gap_operator
+from .operator import MIN_COVERAGE, gap_operator
 from .reconstruction import Reconstruction, form_of
 from .recovery import Recovery, RecoveryRequest, with_status
 from .roughness import Smooth, smoothed
@@ -38,8 +38,6 @@ from .status import find_status
 Boundary = tuple[skfem.Mesh, Names]
 Recovered = Literal["automatic", "linear", "quadratic", "smooth"]
 Gap = float | Callable[[np.ndarray], np.ndarray]
-# Facets that cover less of their area have no partner, and carry no pressure.
-_COVERED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,8 @@ class LocalAverageContact:
         belongs here. Where both boundaries are on one mesh, the master's too.
     area, covered, initial
         By slave facet (k,), in the order of its boundary: its area, the area opposite the master,
-        and the integral of the initial gap over that.
+        and the integral of the initial gap over that. A facet of which less than 1 % is opposite
+        the master carries no pressure.
 
     Raises:
     ------
@@ -194,7 +193,7 @@ class LocalAverageContact:
         if not self._whole:
             self._cells["master"] = first + master[0].dofs.element_dofs.T
         self.area, self.covered = operator.area, operator.covered
-        self._opposed = self.covered > _COVERED * self.area
+        self._opposed = self.covered > MIN_COVERAGE * self.area
         if not self._opposed.any():
             raise ValueError(f"slave = {slave[1]!r}: no facet of {master[1]!r} is opposite to it")
         self.initial = operator.initial if gap is None else self._given(slaves, points, gap)

@@ -28,6 +28,8 @@ from .partners import Samples, Surface, face_samples, on_one_surface, uncovered
 from .recovery import Recovery, RecoveryRequest, recovery
 from .segments import Segments, intersect
 
+MIN_COVERAGE = 0.01
+"""A macro-element covered by less than this share of its area is out of contact."""
 # Coefficients below this share of their row's largest are round-off.
 _ROUND_OFF = 1e-13
 # The distance within which such faces are looked for grows by this factor at a time.

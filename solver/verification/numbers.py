@@ -11,8 +11,8 @@ import numpy as np
 from ..case.acting import Step, factor_of
 from ..case.expressions import evaluate
 from ..case.model import Case
+from ..lac.operator import MIN_COVERAGE
 from ..mechanics.fem.stress import COMPONENTS
-from ..simulation.equilibrium.constraints import MIN_COVERAGE
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError, hint

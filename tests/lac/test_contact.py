@@ -145,6 +145,17 @@ def test_a_status_that_is_not_found_step_by_step_is_that_of_the_complementarity(
     assert state.closed[-1]
 
 
+def test_a_facet_that_is_hardly_covered_carries_nothing():
+    """Of 0.6 % it would bear almost all that is pressed beyond the master."""
+    lower, upper = block(skfem.MeshQuad1, 2, 4, 0.0), block(skfem.MeshQuad1, 2, 4, 25.0)
+    for shift, closed in ((0.5, 4), (12.425, 3)):
+        contact = LocalAverageContact((upper.translated((shift, 0.0)), "bottom"), (lower, "top"))
+        state, *_ = pressed(contact, lower, 2)
+        assert contact.covered[-1] / contact.area[-1] == pytest.approx(1 - shift / 12.5)
+        assert state.closed.sum() == closed
+        assert state.pressure.max() < 100
+
+
 def test_a_given_gap_takes_the_place_of_the_meshed_one():
     lower, upper = block(skfem.MeshQuad1, 2, 2, 0.0), block(skfem.MeshQuad1, 2, 3, 25.0)
     both = (upper, "bottom"), (lower, "top")

@@ -35,6 +35,41 @@ def pressed(n: int, m: int, form: str, bottom: str = "QUAD8", top: str = "TRIA6"
     return content
 
 
+@pytest.mark.parametrize(
+    ("pressure", "gap", "form", "settles"),
+    [
+        ("5.34*(1 - 0.689*x/50)", "0.1*sin(x/9)", "smooth", True),
+        ("9.38*(1 + 0.116*x/50)", "0.1*sin(x/5)", "quadratic", True),
+        ("3.45*(1 + 0.739*x/50)", "0.1*sin(x/15)", "linear", False),
+    ],
+)
+def test_the_status_is_that_under_the_recovered_pressure(pressure, gap, form, settles):
+    """On few tetrahedra over waves, where a reconstruction closes what was open."""
+    content = {
+        "name": "waves",
+        "mesh": {
+            "recipe": "blocks",
+            "size": [50, 50, 25],
+            "bottom": {"cells": "TETRA4", "divisions": [2, 2, 2]},
+            "top": {"cells": "TETRA4", "divisions": [3, 3, 3]},
+        },
+        "materials": {"all": {"young": 2000, "poisson": 0.3}},
+        "supports": [{"group": g, "fix": [g[-1]]} for g in ("symx", "symy")],
+        "loads": [{"group": "press", "pressure": pressure}],
+        "contact": [{"name": "i", "slave": "bottom_contact", "master": "top_contact"}],
+    }
+    content["supports"].append({"group": "base", "fix": ["z"]})
+    content["contact"][0] |= {"clearance": gap, "recovery": form}
+    [zone] = solved(content).zones
+    content["contact"][0]["recovery"] = "none"
+    [plain] = solved(content).zones
+    assert (zone.recovered is not None) == settles
+    assert (zone.closed != plain.closed).any() == settles
+    assert zone.multiplier.min() >= 0
+    assert zone.gap.min() > -1e-12
+    assert not (zone.multiplier * (zone.gap > 1e-12)).any()
+
+
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("faces", [1, 2, 3])
 def test_zones_of_few_faces(faces, form):

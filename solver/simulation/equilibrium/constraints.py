@@ -14,7 +14,7 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.cells.faces import surface_nodes
 from ...lac.motions import motion_fields, support_resistance, unheld_motion
-from ...lac.operator import without_round_off
+from ...lac.operator import MIN_COVERAGE, without_round_off
 from ...lac.roughness import Smooth, smoothed
 from ...mechanics.fem.bodies import nodes_of_unknowns
 from ...mechanics.fem.elasticity import stiffness
@@ -26,8 +26,6 @@ from ...system.errors import InputError
 from ..scene.bodies import body_names
 from ..scene.scene import Scene, ZoneScene
 
-# A macro-element covered by less than this share of its area is out of contact.
-MIN_COVERAGE = 0.01
 # Multipliers whose coefficients on free unknowns are below this share of all are inactive.
 _ACTIVE = 1e-12
 # Coverage above one by more than this means that the master surface lies there twice. The areas of

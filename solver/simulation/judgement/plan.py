@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...lac.cut import needs_cut
-from ..equilibrium.constraints import MIN_COVERAGE
+from ...lac.operator import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
 from ..options import Options

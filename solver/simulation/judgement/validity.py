@@ -14,10 +14,10 @@ from scipy import sparse
 from ...case.model import Case
 from ...lac.cells.catalogue import CellType, cell_type
 from ...lac.cells.faces import circumference
+from ...lac.operator import MIN_COVERAGE
 from ...lac.pairing import candidate_pairs
 from ...lac.threads import prefetch
 from ...mechanics.fem.stress import largest_strain
-from ..equilibrium.constraints import MIN_COVERAGE
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
 from ..results.records import Validity
