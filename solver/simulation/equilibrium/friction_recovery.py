@@ -22,13 +22,14 @@ from ...lac.recovery import Recovery, settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, grows, recovered
+from .recovery import ZoneFit, fit_of, grows, negligible, recovered
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
 # So many sweeps at most, unless the case says how many, and the change of a mean, as a share of the
-# largest, that ends them: slips have a memory, so that what is left would add up over steps.
-_MOST_SWEEPS, _SETTLED = 40, 1e-10
+# largest, that ends them: slips have a memory, so that what is left would add up over steps. A last
+# change of more than `_UNSETTLED` is no end: a macro-element sticks and slips in turn.
+_MOST_SWEEPS, _SETTLED, _UNSETTLED = 40, 1e-10, 1e-6
 # Axes of macro-elements that differ by less, as a share of them, are the same.
 _TURNED = 1e-9
 
@@ -164,6 +165,9 @@ class _Sweeping:
         couples = (each.couple(values) for each in loads)
         found = self._under(np.sum(forces, axis=0))
         self._refuse_growth(found.pressure - values, found)
+        left = np.abs(found.pressure - values).max(initial=0.0)
+        if enough and left > negligible(found, _UNSETTLED):
+            raise SolveError("the sweeps do not settle")
         fields = {}
         for each, force in zip(loads, forces, strict=True):
             read = each.fit.read(found.pressure, each.fit.coefficients(values))

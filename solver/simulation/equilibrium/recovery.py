@@ -109,10 +109,14 @@ def grows(first: float, change: float, state: Equilibrium) -> bool:
     Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and the
     sweeps diverge.
     """
+    return bool(change > max(_GROWTH * first, negligible(state, _ROUNDING)))
+
+
+def negligible(state: Equilibrium, share: float) -> float:
+    """A change of pressure that is no more than a `share` of the largest, or than rounding."""
     limit = state.trial.pressure_limit
     known = limit[np.isfinite(limit)].max(initial=0.0)
-    rounding = max(_ROUNDING * np.abs(state.pressure).max(initial=0.0), known)
-    return bool(change > max(_GROWTH * first, rounding))
+    return float(max(share * np.abs(state.pressure).max(initial=0.0), known))
 
 
 def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
