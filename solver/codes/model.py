@@ -13,6 +13,7 @@ from ..case.model import Case
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import FaceBlock, nodal_normals, surface_nodes, surface_points
 from ..lac.cells.shape import shape_functions
+from ..simulation.fit import refuse_unfit
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.records import Cost, Fields, Scalars
 from ..simulation.results.results import body_infos
@@ -34,7 +35,9 @@ class Model:
     @classmethod
     def of(cls, case: Case, mesh: meshio.Mesh) -> Model:
         """The model of a case; raises InputError where case and mesh do not fit."""
-        return cls(case, mesh, build_scene(case, mesh))
+        scene = build_scene(case, mesh)
+        refuse_unfit(scene)
+        return cls(case, mesh, scene)
 
     @property
     def points(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..system.errors import InputError
+from ..system.errors import InputError, hint
 from .scene.bodies import ONE_PLACE, bodies_of, body_names
 from .scene.probing import cell_at, faces_at
 from .scene.scene import Scene, ZoneScene
@@ -34,6 +34,20 @@ def refusals(scene: Scene) -> Iterator[InputError]:
     yield from _unmerged(scene)
     for name in scene.case.probes:
         yield from _probe(scene, name)
+    yield from _compared(scene)
+
+
+def _compared(scene: Scene) -> Iterator[InputError]:
+    """What a case gives values of is there: holds something, or is a body."""
+    case, held, bodies = scene.case, scene.holders, body_names(scene)
+    for group in case.reference.values.get("reaction", {}):
+        if group not in held:
+            allowed = f"no support holds it; {hint(group, held)}"
+            yield InputError(case.path, f"reference.reaction.{group}", group, allowed)
+    for group in case.mesh.counts:
+        if group not in bodies:
+            allowed = f"is not a body; {hint(group, bodies)}"
+            yield InputError(case.path, f"counts.{group}", group, allowed)
 
 
 def _groups(scene: Scene, i: int, zone: ZoneScene) -> Iterator[InputError]:

@@ -9,7 +9,7 @@ import yaml
 
 from solver.case.reader import parse_case
 from solver.mesh import generate
-from solver.simulation.simulate import simulate
+from solver.simulation.simulate import refusals_on, simulate
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.results import read_result, write_result
@@ -110,7 +110,12 @@ def test_reactions_that_are_refused():
     mesh = block_mesh("QUAD4", "QUAD4", (2, 2))
     other = changed_case(2, extra=NUMBERS.replace("symx:", "farx:"))
     with pytest.raises(InputError, match=r"reference.reaction.farx.*no support holds it; "):
-        run_checks(simulate(other, mesh))
+        simulate(other, mesh)
+    half = (
+        "groups: {half: {of: cells, within: bottom, where: x - 0.4}}\ncounts: {half: {cells: 1}}\n"
+    )
+    [told] = refusals_on(changed_case(2, extra=half), mesh)
+    assert "counts.half = 'half': is not a body; allowed: bottom, top" in str(told)
     with pytest.raises(InputError, match=r"reference.reaction.base.*must have 2 components"):
         changed_case(2, extra=NUMBERS.replace("base: [0.0, 25.0]", "base: [0.0, 25.0, 0.0]"))
 

@@ -88,10 +88,8 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
         if len(nodes):
             force = found.setdefault(fixed.holder, np.zeros_like(left))
             force[nodes] += part
-    for name in ("together", "cyclic"):
-        if any(getattr(support, name) for support in scene.case.supports):
-            found[name] = found.get(name, 0.0) + left
-            break  # what both of them hold is not distinguished
+    if scene.ties:
+        found[scene.ties] = found.get(scene.ties, 0.0) + left
     for part, term in zip(state.iterate.scene.parts, state.iterate.terms, strict=True):
         if part.holder:
             found[part.holder] = found.get(part.holder, 0.0) - term.ground

@@ -153,6 +153,18 @@ class Scene:
         return sparse.vstack([sparse.csr_matrix((0, self.n_dofs)), *rows]).tocsr()
 
     @property
+    def ties(self) -> str:
+        """The name of the reaction of ties and cyclic sides, which are not told apart."""
+        given = ("together", "cyclic")
+        return next((k for k in given if any(getattr(s, k) for s in self.case.supports)), "")
+
+    @property
+    def holders(self) -> set[str]:
+        """The names of all that has a reaction."""
+        fixed = {one.holder for one in self.held.fixed if len(one.nodes)}
+        return (fixed | {self.ties} | {part.holder for part in self.parts}) - {""}
+
+    @property
     def n_dofs(self) -> int:
         """Number of degrees of freedom, held ones included."""
         return self.points.size
