@@ -8,23 +8,25 @@ import yaml
 
 from tests.arguments import whole
 
-from .cases import drawn
+from .cases import FOUND, drawn
 from .judge import compared
 
 
 def main(count: int, start: int) -> int:
-    """The cases whose views differ, printed as YAML; 1 where there are any."""
+    """The cases whose views differ, printed as YAML; 1 where there are any.
+
+    First those that differed once.
+    """
     started, words, wrong = time.monotonic(), Counter[str](), 0
-    for seed in range(start, start + count):
-        case = drawn(seed)
+    for case in (*FOUND.values(), *(drawn(seed) for seed in range(start, start + count))):
         word, found = compared(case)
         words[word] += 1
         if found:
             wrong += 1
-            print(f"seed {seed}: {'; '.join(found)}")
+            print(f"{case['name']}: {'; '.join(found)}")
             print(yaml.safe_dump(case, sort_keys=False), flush=True)
     said = ", ".join(f"{number} {word}" for word, number in words.most_common())
-    print(f"{count} cases, {wrong} differ, {time.monotonic() - started:.0f} s: {said}")
+    print(f"{words.total()} cases, {wrong} differ, {time.monotonic() - started:.0f} s: {said}")
     return int(wrong > 0)
 
 

@@ -1,7 +1,10 @@
 """Random small cases of contact in which many options meet, without an exact answer."""
 
+from pathlib import Path
 from random import Random
 from typing import Any
+
+import yaml
 
 Case = dict[str, Any]
 CELLS = {
@@ -18,6 +21,8 @@ STEPS = ([1.0], [1.0], [0.3, 0.7, 1.0], [1.0, 0.5, 0.0], [1.0, 0.2, 1.3])
 FRICTION = (0.0, 0.0, 0.0, 0.05, 0.1, 0.3, 0.5, 1.0, 2.0, 10.0)
 RECOVERY = ("none", "none", "linear", "quadratic", "smooth", "automatic")
 OTHERS = ("uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual")
+
+FOUND: dict[str, Case] = yaml.safe_load((Path(__file__).parent / "found.yaml").read_text())
 
 
 def drawn(seed: int) -> Case:

@@ -3,6 +3,7 @@
 import signal
 from collections.abc import Iterator
 from copy import deepcopy
+from itertools import islice
 from random import Random
 from types import FrameType
 from typing import Any, NamedTuple
@@ -144,14 +145,20 @@ def _moved(solved: Solved) -> np.ndarray:
     return np.sort(np.linalg.norm(solved.displacement, axis=1))
 
 
-def compared(case: Case) -> tuple[str, list[str]]:
-    """The word of a case, and what differs between its views; empty where nothing does."""
-    first, found = seen(case), list[str]()
+def compared(case: Case, most: int | None = None) -> tuple[str, list[str]]:
+    """The word of a case, and what differs between its views, `most` of that.
+
+    Empty where nothing does.
+    """
+    first = seen(case)
+    return first.word, list(islice(_differences(case, first), most))
+
+
+def _differences(case: Case, first: Seen) -> Iterator[str]:
     for name, other, everything in views(case) if first.word != "refused" else ():
         unit, length = (UNITS, LENGTHS) if name == "other units" else (1.0, 1.0)
         again = seen(other, everything, unit, length)
-        found += [f"{name}: {what}" for what in _between(first, again, name)]
-    return first.word, found
+        yield from (f"{name}: {what}" for what in _between(first, again, name))
 
 
 def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
