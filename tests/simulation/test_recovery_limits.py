@@ -64,6 +64,7 @@ def test_the_status_is_that_under_the_recovered_pressure(pressure, gap, form, se
     content["contact"][0]["recovery"] = "none"
     [plain] = solved(content).zones
     assert (zone.recovered is not None) == settles
+    assert np.isfinite(zone.estimates.pressure_error).all()
     assert (zone.closed != plain.closed).any() == settles
     assert zone.multiplier.min() >= 0
     assert zone.gap.min() > -1e-12

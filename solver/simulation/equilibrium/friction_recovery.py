@@ -22,7 +22,7 @@ from ...lac.recovery import Recovery, settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, grows, negligible, recovered
+from .recovery import ZoneFit, estimated, fit_of, grows, negligible, recovered
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ def solve_and_recover(
     """Equilibrium at a step after the state `before`, with its recovered pressure by zone.
 
     Where the state does not settle under the correction, it stays as it is and no pressure is
-    recovered. Raises SolveError where there is no equilibrium.
+    recovered, in the steps that follow neither. Raises SolveError where there is no equilibrium.
     """
     search, zones = Search(problem, step, before), problem.scene.zones
     given = [(zone, zone.operator.recovery) for zone in zones if zone.operator.recovery]
@@ -115,7 +115,8 @@ def solve_and_recover(
     if not any(zone.zone.sweeps for zone in zones):
         sweeps, enough = _MOST_SWEEPS, _SETTLED
     last = before if before and _goes_on(given, before) else None
-    for start in (last, None) if last else (None,):
+    starts = [last, None] if last else [None]
+    for start in starts if before is None or _is_recovered(given, before) else ():
         sweeping = _Sweeping(search, [zone for zone, _ in given], start)
         try:
             return sweeping.settled(sweeps, enough)
@@ -123,7 +124,7 @@ def solve_and_recover(
             continue
     state = search.settled()
     _LOG.info("recovery: the state does not settle; pressure and traction stay constant by face")
-    return state
+    return estimated([zone for zone, _ in given], state)
 
 
 def _goes_on(given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium) -> bool:
@@ -133,6 +134,12 @@ def _goes_on(given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium) -
         if field is None or np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
             return False
     return True
+
+
+def _is_recovered(given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium) -> bool:
+    """Whether no zone has constants in a state where it should have a recovered pressure."""
+    fields = ((before.fields.get(zone.zone.name), recovery) for zone, recovery in given)
+    return all(field is None or field.form == recovery.form.name for field, recovery in fields)
 
 
 class _Sweeping:

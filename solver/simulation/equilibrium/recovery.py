@@ -73,7 +73,7 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     """The equilibrium of a step under the recovered pressure, with this by zone.
 
     Where the status does not settle under the correction, the state stays as it is and no pressure
-    is recovered.
+    is recovered, but the error of the constants is estimated.
     """
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
     if not given or not state.status.closed.any():
@@ -93,7 +93,7 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     found = with_status(state, correct, wrong, again)
     if found is None:
         _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
-        return state
+        return estimated(given, state)
     fields = {
         zone.zone.name: fit.field(coefficients, force)
         for zone, fit, coefficients, force in zip(
@@ -101,6 +101,16 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
         )
     }
     return replace(found.state, fields=fields)
+
+
+def estimated(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium:
+    """The state with the error of its constants, by a reconstruction that is not applied."""
+    fields, nothing = {}, np.zeros(state.correction.size)
+    for zone in zones:
+        fit = fit_of(zone, state.status.closed)
+        field = fit.field(fit.coefficients(state.pressure), nothing)
+        fields[zone.zone.name] = replace(field, form="none")
+    return replace(state, fields=fields)
 
 
 def grows(first: float, change: float, state: Equilibrium) -> bool:

@@ -127,9 +127,8 @@ def estimated(solution: Solution) -> Iterator[Line]:
             yield Line(f"{zone.name}: pressure not recovered", "no state settles under it")
         error = zone.relative_pressure_error
         if error is not None and error > _ROUNDING:
-            how = f"a {zone.recovered.form} one" if zone.recovered else "a linear one"
             what = f"{zone.name}: estimated error of the constant pressure {error:.1e} in L2"
-            yield Line(what, f"it differs so much from {how}, reconstructed from neighbours")
+            yield Line(what, "it differs so much from a reconstruction from neighbours")
         if zone.recovered and (left := int((zone.closed & (zone.recovered.degree == 0)).sum())):
             what = f"{zone.name}: pressure constant on {left} macro-elements"
             yield Line(what, "too few closed neighbours to recover it from")
