@@ -121,3 +121,13 @@ def test_a_probe_that_a_moving_surface_leaves_is_refused():
     case = parse_case(text + "probes: {face: {group: corner, zone: interface}}\n", Path("p.yaml"))
     with pytest.raises(InputError, match=r"probes\.face\.group = 'corner': is 5 from the slave"):
         simulate(case.as_solved(True), mesh_of(case))
+
+
+def test_a_pressure_on_a_surface_that_moves_is_no_displacement():
+    text = (ROOT / "cases/motion/slide-a.yaml").read_text()
+    probes = "probes: {foot: {group: top_contact, zone: interface}, end: {group: press}}\n"
+    case = parse_case(text + probes, Path("p.yaml")).as_solved(True)
+    found = simulate(case, mesh_of(case)).places.probes
+    assert found["foot"].pressure == pytest.approx(25.0 + np.zeros(7), rel=1e-10)
+    assert np.isnan(found["foot"].displacement).all()
+    assert found["end"].displacement[:, 0] == pytest.approx(40.0 + np.zeros(4), abs=0.1)
