@@ -12,9 +12,7 @@ from solver import solve_case
 from solver.case.acting import Cyclic, Support
 from solver.case.expressions import Expression
 from solver.report.case_picture import draw_case
-from solver.report.charts import GREEN, INK
-from solver.report.layout import Drawing
-from solver.report.view import Label, draw_labels
+from solver.report.charts import GREEN
 from tests import handmade
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -49,43 +47,13 @@ def assert_apart(svg):
         assert bottom <= height, words
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "shared/cross-quad4-tria3",
-        "shared/cross-hexa8-tetra10",
-        "shared/corner-hexa8-tetra4",
-        "manufactured/hexa8",
-        "manufactured/quad4",
-        "half-planes/wedge-tria6",
-        "rigid/between-planes",
-        "rigid/tilted-die",
-        "loads/foundation",
-        "lame/spheres-hexa8",
-    ],
-)
+@pytest.mark.parametrize("name", ["shared/cross-hexa8-tetra10", "rigid/between-planes"])
 def test_texts_of_crowded_pictures_do_not_meet(name):
     solved = solve_case(CASES / f"{name}.yaml")
     svg = solved.picture()
     assert_apart(svg)
     words = {words for words, _ in texts(svg)}
     assert {body.name for body in solved.solution.bodies} <= words
-
-
-@pytest.mark.parametrize(("number", "shown"), [(3, 3), (15, 15), (100, 18)])
-def test_labels_are_apart_in_their_order(number, shown):
-    drawing = Drawing(200, 360, "")
-    labels = [
-        Label([(f"body {k}", INK), ("HEXA8", INK), ("slave", INK)], np.array([0.0, 300 - k]), True)
-        for k in range(number)
-    ]
-    draw_labels(drawing, labels, (100, 12, 90, 336))
-    svg = drawing.svg()
-    assert_apart(svg)
-    names = [words for words, _ in texts(svg) if words.startswith("body")]
-    assert len(names) == (shown if number == shown else shown - 1)
-    assert names[0].startswith(f"body {number - 1}"), "the highest first"
-    assert ("and 83 more" in svg) == (number == 100)
 
 
 def shapes(svg, corners, **attributes):
