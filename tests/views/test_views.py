@@ -84,12 +84,12 @@ def without_guess(*search):
 
 def forgotten(_given, _before):
     """A recovered pressure with friction does not go on from the last step."""
-    return False
+    return [None]
 
 
 PLANTED = {
     "left": (problem, "find_status", without_guess),
-    "memory": (friction_recovery, "_goes_on", forgotten),
+    "memory": (friction_recovery, "_starts", forgotten),
     "shrunk": (validity, "facets_of", by_rounding(facet_gaps.facets_of)),
     "frames": (friction_recovery, "of_tractions", frames_apart),
     "columns": (reconstruction, "_scale", by_column),

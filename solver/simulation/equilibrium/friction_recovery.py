@@ -114,9 +114,7 @@ def solve_and_recover(
         return recovered(problem, search.settled(), step)
     if not any(zone.zone.sweeps for zone in zones):
         sweeps, enough = _MOST_SWEEPS, _SETTLED
-    last = before if before and _goes_on(given, before) else None
-    starts = [last, None] if last else [None]
-    for start in starts if before is None or _is_recovered(given, before) else ():
+    for start in _starts(given, before):
         sweeping = _Sweeping(search, [zone for zone, _ in given], start)
         try:
             return sweeping.settled(sweeps, enough)
@@ -127,19 +125,23 @@ def solve_and_recover(
     return estimated([zone for zone, _ in given], state)
 
 
-def _goes_on(given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium) -> bool:
-    """Whether all zones have a recovered pressure in a state, along the axes that they have now."""
-    for zone, recovery in given:
-        axes, field = recovery.moments.local.axes, before.fields.get(zone.zone.name)
-        if field is None or np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
-            return False
-    return True
+def _starts(
+    given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium | None
+) -> list[Equilibrium | None]:
+    """What sweeps go on from: the last step, where its axes are those of now, then nothing at all.
 
-
-def _is_recovered(given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium) -> bool:
-    """Whether no zone has constants in a state where it should have a recovered pressure."""
-    fields = ((before.fields.get(zone.zone.name), recovery) for zone, recovery in given)
-    return all(field is None or field.form == recovery.form.name for field, recovery in fields)
+    Empty where that step has constants in place of a recovered pressure.
+    """
+    if before is None:
+        return [None]
+    pairs = [(recovery, before.fields.get(zone.zone.name)) for zone, recovery in given]
+    if any(field and field.form != recovery.form.name for recovery, field in pairs):
+        return []
+    for recovery, field in pairs:
+        axes = recovery.moments.local.axes
+        if not field or np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
+            return [None]
+    return [before, None]
 
 
 class _Sweeping:
