@@ -88,8 +88,8 @@ def reactions(scene: Scene, state: Equilibrium) -> tuple[list[Reaction], np.ndar
         if len(nodes):
             force = found.setdefault(fixed.holder, np.zeros_like(left))
             force[nodes] += part
-    if scene.ties:
-        found[scene.ties] = found.get(scene.ties, 0.0) + left
+    if joint := scene.held.joint:
+        found[joint] = found.get(joint, 0.0) + left
     for part, term in zip(state.iterate.scene.parts, state.iterate.terms, strict=True):
         if part.holder:
             found[part.holder] = found.get(part.holder, 0.0) - term.ground

@@ -127,6 +127,11 @@ class Attributes(CutGroups):
         """What holds and joins the bodies."""
         return holdings_of(self)
 
+    @property
+    def joint(self) -> str:
+        """What joins nodes, by the name of its reaction: the last link, as they share one."""
+        return next((one.holder for one in self.holdings[::-1] if one.holder), "")
+
     def frames(self) -> dict[str, Frame]:
         """The rigid bodies by name."""
         return {name: f for holding in self.holdings for name, f in holding.frames.items()}

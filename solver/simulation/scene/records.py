@@ -49,10 +49,14 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class Held:
-    """The displacements that are `fixed`, and the `frames` of rigid bodies by name."""
+    """The displacements that are `fixed`, and the `frames` of rigid bodies by name.
+
+    `joint`: the name of the reaction of nodes that are joined, which have one; else empty.
+    """
 
     fixed: list[Fixed]
     frames: dict[str, Frame]
+    joint: str
 
 
 @dataclass(frozen=True)

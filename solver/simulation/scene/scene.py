@@ -153,16 +153,10 @@ class Scene:
         return sparse.vstack([sparse.csr_matrix((0, self.n_dofs)), *rows]).tocsr()
 
     @property
-    def ties(self) -> str:
-        """The name of the reaction of ties and cyclic sides, which are not told apart."""
-        given = ("together", "cyclic")
-        return next((k for k in given if any(getattr(s, k) for s in self.case.supports)), "")
-
-    @property
     def holders(self) -> set[str]:
         """The names of all that has a reaction."""
         fixed = {one.holder for one in self.held.fixed if len(one.nodes)}
-        return (fixed | {self.ties} | {part.holder for part in self.parts}) - {""}
+        return (fixed | {self.held.joint} | {part.holder for part in self.parts}) - {""}
 
     @property
     def n_dofs(self) -> int:
@@ -278,7 +272,7 @@ def scene_of(model: CutModel, groups: Attributes, clock: Clock) -> Scene:
         body=groups.body,
         blocks=blocks,
         parts=parts,
-        held=Held(list(groups.fixed().values()), groups.frames()),
+        held=Held(list(groups.fixed().values()), groups.frames(), groups.joint),
         free=free,
         loads=Loads(force, groups.histories(), model.at_work or AtWork.of(force, free.offset)),
         named=Named(

@@ -18,6 +18,8 @@ _NEAR = 1e-6
 class CyclicSides(Holding):
     """The sides of a case that are copies."""
 
+    holder = "cyclic"
+
     def __init__(self, groups: CutGroups):
         copies = copies_of(groups)
         self.keys, self._copies = list(copies), list(copies.values())

@@ -16,6 +16,8 @@ class Holding:
 
     keys: Sequence[str] = ()
     """The keys of the case file of what `link` joins."""
+    holder = ""
+    """The name of the reaction, where `link` joins nodes that nothing fixes."""
     frames: Mapping[str, Frame] = {}
     """The rigid bodies by name."""
     moving: np.ndarray | None = None

@@ -13,6 +13,8 @@ from .holding import Holding
 class Together(Holding):
     """The ties of a case."""
 
+    holder = "together"
+
     def __init__(self, groups: CutGroups):
         ties = ties_of(groups)
         self.keys, self._ties = list(ties), list(ties.values())
