@@ -8,7 +8,7 @@ import yaml
 
 from tests.arguments import whole
 
-from .cases import FOUND, drawn
+from .cases import FOUND, drawn, word_of
 from .judge import compared
 
 
@@ -21,6 +21,8 @@ def main(count: int, start: int) -> int:
     for case in (*FOUND.values(), *(drawn(seed) for seed in range(start, start + count))):
         word, found = compared(case)
         words[word] += 1
+        if word != (wanted := word_of(case) or word):
+            found = [f"{word}, not {wanted}", *found]
         if found:
             wrong += 1
             print(f"{case['name']}: {'; '.join(found)}")

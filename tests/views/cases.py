@@ -22,7 +22,16 @@ FRICTION = (0.0, 0.0, 0.0, 0.05, 0.1, 0.3, 0.5, 1.0, 2.0, 10.0)
 RECOVERY = ("none", "none", "linear", "quadratic", "smooth", "automatic")
 OTHERS = ("uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual")
 
+# Facets of curved contact change their pressure by more than a tenth.
+_FACETED = ("frames", "smooth")
 FOUND: dict[str, Case] = yaml.safe_load((Path(__file__).parent / "found.yaml").read_text())
+
+
+def word_of(case: Case) -> str:
+    """How a case that differed once ends; empty for a random one, which may end in any way."""
+    if case["name"] not in FOUND:
+        return ""
+    return "unreliable" if case["name"] in _FACETED else "solved"
 
 
 def drawn(seed: int) -> Case:

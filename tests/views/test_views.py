@@ -16,13 +16,11 @@ from solver.simulation.equilibrium.friction import Search
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement import facet_gaps, validity
 
-from .cases import FOUND, drawn
+from .cases import FOUND, drawn, word_of
 from .judge import compared
 
 # `make views` compares all of them.
 SOME = list(FOUND)[::3]
-# Facets of curved contact change their pressure by more than a tenth.
-FACETED = ("frames", "smooth")
 # Each solves in a fraction of a second, in five views.
 DRAWN = range(100, 109)
 
@@ -31,7 +29,7 @@ DRAWN = range(100, 109)
 def test_a_view_that_differed_once_is_the_same_now(name):
     word, differences = compared(FOUND[name])
     assert not differences
-    assert word == ("unreliable" if name in FACETED else "solved")
+    assert word == word_of(FOUND[name])
 
 
 @pytest.mark.parametrize("seed", DRAWN)

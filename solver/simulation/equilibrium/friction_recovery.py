@@ -22,7 +22,7 @@ from ...lac.recovery import Recovery, settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, estimated, fit_of, grows, negligible, recovered
+from .recovery import ZoneFit, fit_of, grows, negligible, with_estimate
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -109,20 +109,21 @@ def solve_and_recover(
     """
     search, zones = Search(problem, step, before), problem.scene.zones
     given = [(zone, zone.operator.recovery) for zone in zones if zone.operator.recovery]
+    recovering = [zone for zone, _ in given]
     sweeps, enough = max((recovery.form.sweeps for _, recovery in given), default=0), 0.0
     if not sweeps:
-        return recovered(problem, search.settled(), step)
+        return with_estimate(recovering, search.settled())
     if not any(zone.zone.sweeps for zone in zones):
         sweeps, enough = _MOST_SWEEPS, _SETTLED
     for start in _starts(given, before):
-        sweeping = _Sweeping(search, [zone for zone, _ in given], start)
+        sweeping = _Sweeping(search, recovering, start)
         try:
             return sweeping.settled(sweeps, enough)
         except SolveError:
             continue
     state = search.settled()
     _LOG.info("recovery: the state does not settle; pressure and traction stay constant by face")
-    return estimated([zone for zone, _ in given], state)
+    return with_estimate(recovering, state)
 
 
 def _starts(
@@ -173,9 +174,9 @@ class _Sweeping:
         forces = [each.force(values) for each in loads]
         couples = (each.couple(values) for each in loads)
         found = self._under(np.sum(forces, axis=0))
-        self._refuse_growth(found.pressure - values, found)
-        left = np.abs(found.pressure - values).max(initial=0.0)
-        if enough and left > negligible(found, _UNSETTLED):
+        left = found.pressure - values
+        self._refuse_growth(left, found)
+        if enough and np.abs(left).max(initial=0.0) > negligible(found, _UNSETTLED):
             raise SolveError("the sweeps do not settle")
         fields = {}
         for each, force in zip(loads, forces, strict=True):

@@ -76,8 +76,9 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     is recovered, but the error of the constants is estimated.
     """
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
-    if not given or not state.status.closed.any():
-        return state
+    applied = any((asked := zone.operator.recovery) and asked.form.sweeps for zone in given)
+    if not applied or not state.status.closed.any():
+        return with_estimate(given, state)
 
     def correct(state: Equilibrium) -> _Corrected | None:
         return _corrected(problem, state, [fit_of(zone, state.status.closed) for zone in given])
@@ -93,7 +94,7 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     found = with_status(state, correct, wrong, again)
     if found is None:
         _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
-        return estimated(given, state)
+        return with_estimate(given, state)
     fields = {
         zone.zone.name: fit.field(coefficients, force)
         for zone, fit, coefficients, force in zip(
@@ -103,10 +104,10 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     return replace(found.state, fields=fields)
 
 
-def estimated(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium:
+def with_estimate(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium:
     """The state with the error of its constants, by a reconstruction that is not applied."""
     fields, nothing = {}, np.zeros(state.correction.size)
-    for zone in zones:
+    for zone in zones if state.status.closed.any() else ():
         fit = fit_of(zone, state.status.closed)
         field = fit.field(fit.coefficients(state.pressure), nothing)
         fields[zone.zone.name] = replace(field, form="none")
@@ -141,11 +142,7 @@ def _corrected(
     problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit]
 ) -> _Corrected | None:
     """The state with the loads of its reconstruction; None where the sweeps diverge."""
-    size = state.correction.size
     sweeps = max(zone.recovery.form.sweeps for zone in zones)
-    if not sweeps:
-        read = [z.coefficients(state.pressure) for z in zones]
-        return _Corrected(state, zones, read, [np.zeros(size)] * len(zones))
 
     def loads(pressure: np.ndarray) -> list[np.ndarray]:
         return [z.recovery.loads.T @ z.coefficients(pressure) for z in zones]
@@ -154,7 +151,7 @@ def _corrected(
         state.pressure,
         state.correction.ravel(),
         sweeps,
-        lambda pressure: sum(loads(pressure), np.zeros(size)),
+        lambda pressure: sum(loads(pressure), np.zeros(state.correction.size)),
         lambda force: problem.pressure_change(state.status.closed, force),
     )
     applied = [zone.coefficients(pressure) for zone in zones]
