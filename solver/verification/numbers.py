@@ -96,8 +96,8 @@ def strain_energy(solution: Solution, _: None, reference: Reference) -> Sample |
 def at_positions(quantity: str) -> Sampler:
     """Sample a field of contact at the positions before the last one, where it is covered.
 
-    The reference is that of the last step: positions under other loads are not compared, friction
-    not where the bodies go another way.
+    The reference is that of the last step: positions that are pressed otherwise are not compared,
+    friction not where the bodies go another way.
     """
 
     def sample(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
@@ -106,8 +106,9 @@ def at_positions(quantity: str) -> Sampler:
         sign = -1.0 if solution.swapped and quantity == "friction_traction" else 1.0
         values, expected, where = [], [], []
         count, dim = len(zone.area), solution.mesh.points.shape[1]
+        normal = zone.area @ zone.normal / zone.area.sum()
         for step, position in enumerate(solution.earlier, start=1):
-            if not _as_in_the_last(solution.case, step, quantity):
+            if not _as_in_the_last(solution.case, step, quantity, normal):
                 continue
             covered = position.of_zone("coverage", number, count) > MIN_COVERAGE
             field = sign * position.of_zone(quantity, number, count).reshape(count, -1)
@@ -123,23 +124,43 @@ def at_positions(quantity: str) -> Sampler:
     return sample
 
 
-def _as_in_the_last(case: Case, step: int, quantity: str) -> bool:
-    """Whether the loads of the last step act in another one, on whatever groups.
+def _as_in_the_last(case: Case, step: int, quantity: str, normal: np.ndarray) -> bool:
+    """Whether what presses in the last step does so in another one, on whatever groups.
 
-    For friction, whether supports and bodies go the same way too.
+    Loads and forces of rigid bodies press. Where none acts, what is moved along `normal` (dim,)
+    does. For friction, supports and bodies must go the same way too.
     """
     here, last = case.steps[step - 1], case.steps[-1]
     if not isinstance(here, dict) and here != last:
         return False
-
-    def acting(step: Step) -> list[str]:
-        factors = ((load, load.factor(step)) for load in case.loads)
-        return sorted(repr((load.kind, load.value, factor)) for load, factor in factors if factor)
-
-    if acting(here) != acting(last):
+    if (acting := _acting(case, last)) != _acting(case, here):
+        return False
+    if not acting and not np.allclose(_moved(case, here, normal), _moved(case, last, normal)):
         return False
     pressed = quantity == "pressure"
     return pressed or np.allclose(_way(case, step), _way(case, len(case.steps)))
+
+
+def _acting(case: Case, step: Step) -> list[str]:
+    """What acts in a step, and its factor."""
+    given = [(load.kind, load.value, load.factor(step)) for load in case.loads]
+    given += [(name, b.force, factor_of(b.name, step)) for name, b in case.rigid.items() if b.force]
+    return sorted(repr(one) for one in given if one[-1])
+
+
+def _moved(case: Case, step: Step, normal: np.ndarray) -> np.ndarray:
+    """How far a step moves each support and rigid body along a normal, as far as a case says."""
+    shares = dict(zip("xyz", normal, strict=False))
+    moves = [(each.name, each.fix) for each in case.supports]
+    moves += [(body.name, body.move) for body in case.rigid.values()]
+    return np.array([
+        factor_of(name, step) * sum(
+            shares.get(axis, 0.0 if axis.startswith("r") else 1.0)
+            * (value if isinstance(value, float) else 1.0)
+            for axis, value in move.items()
+        )
+        for name, move in moves
+    ])
 
 
 def _way(case: Case, step: int) -> np.ndarray:

@@ -64,11 +64,20 @@ steps: [0.5, 1.0, 1.2, 1.0]
 contact: [{name: interface, slave: bottom_contact, master: top_contact}]
 reference: {kind: analytical, contact_pressure: 2.5}
 """
+# Pressed by what moves a side, and by what acts on a rigid body: half as far, as far, further.
+LOADS = ("[{group: press, pressure: 2.5}]", "[]")
+HELD = PRESSED.replace("symx, fix: [x]}", "symx, fix: [x]}, {group: press, name: on, fix: {y: DOWN}}")
+HELD = HELD.replace("DOWN", str(-2.5 * 20 * 0.91 / 2000)).replace(*LOADS)
+RIGID = PRESSED.replace("loads:", "bodies: {top: {rigid: true, force: {y: -25}, name: on}}\nloads:")
+RIGID = RIGID.replace(*LOADS).replace("{group: symx", "{at: [0, -10]")
+BY_NAME = ("[0.5, 1.0, 1.2, 1.0]", "[{on: 0.5}, {on: 1.0}, {on: 1.2}, {on: 1.0}]")
 PATHS = {
     "pressed by and by": (sliding([1, 2], substeps=2), [2]),
     "back": (sliding([1, 2, 1]), [1, 2]),
     "pressed harder": (sliding([1, 2, 3], factor=lambda step: step / 3), []),
     "factors": (parse_case(PRESSED, Path("pressed.yaml")), [2]),
+    "a side": (parse_case(HELD.replace(*BY_NAME), Path("held.yaml")), [2]),
+    "a rigid body": (parse_case(RIGID.replace(*BY_NAME), Path("rigid.yaml")), [2]),
 }
 
 
@@ -94,7 +103,7 @@ def test_friction_is_compared_where_the_bodies_go_the_same_way(columns, compared
     case = sliding(columns, "slide-c-friction")
     before = range(1, len(columns))
     found = [
-        [step for step in before if _as_in_the_last(case, step, quantity)]
+        [step for step in before if _as_in_the_last(case, step, quantity, np.array([0.0, 1.0]))]
         for quantity in ("friction_traction", "pressure")
     ]
     assert found == [compared, list(before)]
