@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -149,18 +150,19 @@ def _acting(case: Case, step: Step) -> list[str]:
 
 
 def _moved(case: Case, step: Step, normal: np.ndarray) -> np.ndarray:
-    """How far a step moves each support and rigid body along a normal, as far as a case says."""
+    """How far a step moves each support and rigid body along a normal."""
     shares = dict(zip("xyz", normal, strict=False))
+
+    def along(move: Mapping[str, Any]) -> float:
+        """Rotations move nothing along it; `normal`, and what is no number, count as one."""
+        given = {key: value for key, value in move.items() if not key.startswith("r")}
+        numbers = ((key, v if isinstance(v, float) else 1.0) for key, v in given.items())
+        return float(sum(shares.get(key, 1.0) * value for key, value in numbers))
+
+    moves: list[tuple[str, Mapping[str, Any]]]
     moves = [(each.name, each.fix) for each in case.supports]
     moves += [(body.name, body.move) for body in case.rigid.values()]
-    return np.array([
-        factor_of(name, step) * sum(
-            shares.get(axis, 0.0 if axis.startswith("r") else 1.0)
-            * (value if isinstance(value, float) else 1.0)
-            for axis, value in move.items()
-        )
-        for name, move in moves
-    ])
+    return np.array([factor_of(name, step) * along(move) for name, move in moves])
 
 
 def _way(case: Case, step: int) -> np.ndarray:

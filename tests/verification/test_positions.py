@@ -66,8 +66,8 @@ reference: {kind: analytical, contact_pressure: 2.5}
 """
 # Pressed by what moves a side, and by what acts on a rigid body: half as far, as far, further.
 LOADS = ("[{group: press, pressure: 2.5}]", "[]")
-HELD = PRESSED.replace("symx, fix: [x]}", "symx, fix: [x]}, {group: press, name: on, fix: {y: DOWN}}")
-HELD = HELD.replace("DOWN", str(-2.5 * 20 * 0.91 / 2000)).replace(*LOADS)
+DOWN = f"{{group: press, name: on, fix: {{y: {-2.5 * 20 * 0.91 / 2000}}}}}"
+HELD = PRESSED.replace("supports: [", f"supports: [{DOWN}, ").replace(*LOADS)
 RIGID = PRESSED.replace("loads:", "bodies: {top: {rigid: true, force: {y: -25}, name: on}}\nloads:")
 RIGID = RIGID.replace(*LOADS).replace("{group: symx", "{at: [0, -10]")
 BY_NAME = ("[0.5, 1.0, 1.2, 1.0]", "[{on: 0.5}, {on: 1.0}, {on: 1.2}, {on: 1.0}]")
