@@ -181,6 +181,14 @@ def test_stress_at_integration_points_is_independent_of_that_at_nodes(solution):
     assert (check.passed, check.where) == (False, "cell 0 (xx)")
 
 
+def test_the_worst_integration_point_counts_where_the_reference_varies(tmp_path):
+    """Far to the right, where stress and reference have neither of their extremes."""
+    text = PLANE.replace("yy: -25.0, zz", "yy: -25.0 + 0.1*x, zz")
+    check = by_name(plane(tmp_path, text))["integration_stress"]
+    farthest = 50 - 25 / 3 * (1 - 1 / np.sqrt(3)) / 2
+    assert check.value - check.reference == pytest.approx(-0.1 * farthest, rel=1e-9)
+
+
 def test_the_deviations_within_the_tolerances_pass(solution):
     solution.zones[0].multiplier[:] = [25.024, 24.976]
     solution.zones[0].gap[:] = [0.00099, -0.00099]

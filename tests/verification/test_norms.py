@@ -14,7 +14,7 @@ from solver.case.rigid import Rigid
 from solver.case.solutions.hertz import HertzCylinder
 from solver.case.solutions.polynomial import Parabola2d, Paraboloid3d
 from solver.mesh import generate
-from solver.simulation.results.solution import ZoneResult
+from solver.simulation.results.solution import NodalContact, ZoneResult
 from solver.simulation.simulate import simulate
 from solver.studies.description import read_study
 from solver.studies.points import points_of
@@ -199,6 +199,15 @@ def test_a_slope_and_a_jump_at_the_end_of_a_contact_do_not(handmade):
     zone.multiplier[outside] += 100 * (-1.0) ** np.arange(outside.sum())
     assert errors(solution)["pressure_oscillation"] == pytest.approx(smooth, abs=1e-12)
     assert smooth < 5e-3
+
+
+def test_the_exact_pressure_at_nodes_does_not_oscillate(handmade):
+    exact = HertzCylinder(force=1.0, radius=1.0, lower=UNIT, upper=UNIT)
+    solution = on_line(handmade, exact, 41, -0.9 * exact.half_width, 0.9 * exact.half_width)
+    pressure = exact.contact_pressure(solution.mesh.points)
+    nodes = np.arange(len(pressure))
+    solution.zones[0].nodal = NodalContact(nodes, pressure, 0 * pressure, pressure > 0)
+    assert errors(solution)["pressure_oscillation"] == pytest.approx(0, abs=1e-12)
 
 
 def test_the_last_two_macro_elements_of_a_contact_are_left_out(handmade):
