@@ -210,6 +210,18 @@ class Case:
         every = self.reference.values.get("contact_pressure") is EXACT
         return self.reference.exact if every or len(self.zones) == 1 else None
 
+    def compared_with(self, key: str) -> Any:
+        """What a quantity is compared with, checked or not: the case's, or its exact solution.
+
+        None where it has nothing.
+        """
+        given, exact = self.reference.values.get(key), self.exact_contact
+        if given is EXACT:
+            return self.reference.exact
+        if given is not None:
+            return given
+        return exact if exact and key in exact.quantities else None
+
     def with_exact(self, exact: "ExactSolution | None") -> "Case":
         """The case with another exact solution."""
         return replace(self, reference=replace(self.reference, exact=exact))

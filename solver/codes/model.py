@@ -9,7 +9,9 @@ from functools import cached_property
 import meshio
 import numpy as np
 
+from ..case.expressions import evaluate
 from ..case.model import Case
+from ..case.solutions.base import ExactSolution
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.faces import FaceBlock, nodal_normals, surface_nodes, surface_points
 from ..lac.cells.shape import shape_functions
@@ -98,13 +100,11 @@ class Model:
 
     def reference_pressure(self, zone: ZoneScene) -> np.ndarray | None:
         """The reference's pressure (m,) at the centres of the slave faces; None without one."""
-        from ..case.expressions import evaluate
-
-        given, exact = self.case.reference.values.get("contact_pressure"), self.case.exact_contact
         centre = zone.operator.surface.centre + self.scene.coordinates.origin
-        if exact is not None and "contact_pressure" in exact.quantities:
-            return exact.contact_pressure(centre)
-        return None if given is None else evaluate(given, centre)
+        found = self.case.compared_with("contact_pressure")
+        if isinstance(found, ExactSolution):
+            return found.contact_pressure(centre)
+        return None if found is None else evaluate(found, centre)
 
     def _zone(self, zone: ZoneScene) -> ZoneResult:
         surface, m = zone.operator.surface, zone.count

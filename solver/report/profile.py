@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..case.expressions import EXACT, Expression, evaluate
+from ..case.expressions import Expression, evaluate
+from ..case.solutions.base import ExactSolution
 from ..lac.cells.faces import surface_points
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
@@ -272,14 +273,9 @@ def expected(solution: Solution, zone: ZoneResult) -> np.ndarray | None:
 
 
 def reference(solution: Solution, key: str) -> Any:
-    """What the checks compare a quantity with, checked or not; None where the case has nothing."""
-    case = solution.case
-    given, exact = case.reference.values.get(key), case.exact_contact
-    if given is EXACT:
-        exact = case.reference.exact
-    elif given is not None:
-        return given
-    return ExactValues(solution, exact) if exact and key in exact.quantities else None
+    """What the checks compare a quantity with, an exact solution as its values on this mesh."""
+    found = solution.case.compared_with(key)
+    return ExactValues(solution, found) if isinstance(found, ExactSolution) else found
 
 
 def position(solution: Solution, zone: ZoneResult, along: Expression | None) -> tuple[str, Place]:

@@ -241,3 +241,6 @@ def test_what_is_given_by_a_solution_has_its_reference_in_every_zone(tmp_path):
     given = replace(given, values={"contact_pressure": EXACT})
     solution.case = replace(solution.case, reference=given)
     assert reference(solution, "contact_pressure").exact is exact
+    stated = replace(given, values={"contact_pressure": 12.0})
+    solution.case = replace(solution.case, zones=solution.case.zones[:1], reference=stated)
+    assert reference(solution, "contact_pressure") == 12.0
