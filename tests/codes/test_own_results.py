@@ -35,24 +35,15 @@ SOLVES = [(case, False) for case in CASES]
 SOLVES += [(case, True) for case in CASES if case.about.directions == "both"]
 
 
-@pytest.fixture(params=SOLVES, ids=lambda solve: solve[0].as_solved(solve[1]).job)
-def solved(request, tmp_path):
-    """A case as it was solved, and the file of its result."""
-    case, swapped = request.param
-    file = tmp_path / "result.vtkhdf"
+@pytest.mark.parametrize(
+    ("case", "swapped"), SOLVES, ids=[case.as_solved(swapped).job for case, swapped in SOLVES]
+)
+def test_the_right_answer_passes_and_a_wrong_pressure_does_not(case, swapped, tmp_path):
+    file, mesh = tmp_path / "result.vtkhdf", mesh_of(case)
     solve_case(case.path, swapped=swapped).save(file)
-    return case.as_solved(swapped), file
-
-
-def test_the_right_answer_passes(solved):
-    case, file = solved
-    verdict = check_foreign(case, read_result_files([file]), mesh_of(case))
+    verdict = check_foreign(case.as_solved(swapped), read_result_files([file]), mesh)
     assert verdict.verdict == "passed", verdict.reason
     assert {"displacement", "stress", "pressure", "gap"} == verdict.foreign.compared.keys()
-
-
-def test_a_wrong_pressure_does_not(solved):
-    case, file = solved
     with h5py.File(file, "a") as content:
         fields = content["VTKHDF/CellData"]
         values, covered = fields["pressure"][()], fields["coverage"][()] > 0.99
@@ -61,7 +52,7 @@ def test_a_wrong_pressure_does_not(solved):
         values[place] += 0.2 * max(values[place], 1.0)
         fields["pressure"][:] = values
     seal(file)
-    verdict = check_foreign(case, read_result_files([file]), mesh_of(case))
+    verdict = check_foreign(case.as_solved(swapped), read_result_files([file]), mesh)
     assert verdict.verdict == "failed"
     assert "multiplier" in verdict.reason or "pressure" in verdict.reason
 

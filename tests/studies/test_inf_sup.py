@@ -30,11 +30,10 @@ def constants(cells, counts, coarser=4, treatment="lac", hexahedra="pyramids", c
     return found
 
 
-@pytest.mark.parametrize("clamped", [True, False])
-@pytest.mark.parametrize("coarser", [1, 4])
+@pytest.mark.parametrize(("coarser", "clamped"), [(1, False), (4, True)])
 @pytest.mark.parametrize("cells", ["TRIA3", "QUAD4", "TRIA6", "QUAD8", "QUAD9"])
 def test_plane_cells_level_off_with_the_cut(cells, coarser, clamped):
-    found = constants(cells, (4, 8, 16, 32), coarser, clamped=clamped)
+    found = constants(cells, (16, 32), coarser, clamped=clamped)
     assert found[-1] > 0.4
     assert found[-1] > 0.97 * found[-2]
 
