@@ -145,7 +145,9 @@ def _as_in_the_last(case: Case, step: int, quantity: str, normal: np.ndarray) ->
 def _acting(case: Case, step: Step) -> list[str]:
     """What acts in a step, and its factor."""
     given = [(load.kind, load.value, load.factor(step)) for load in case.loads]
-    given += [(name, b.force, factor_of(b.name, step)) for name, b in case.rigid.items() if b.force]
+    for name, body in case.rigid.items():
+        if any(body.force.values()):  # a component whose force is zero is free
+            given.append((name, body.force, factor_of(body.name, step)))
     return sorted(repr(one) for one in given if one[-1])
 
 

@@ -107,3 +107,9 @@ def test_friction_is_compared_where_the_bodies_go_the_same_way(columns, compared
         for quantity in ("friction_traction", "pressure")
     ]
     assert found == [compared, list(before)]
+
+
+def test_a_body_that_is_free_in_a_component_is_not_pressed_by_it():
+    free = RIGID.replace("force: {y: -25}", "move: {x: 1}, force: {rz: 0}")
+    case = parse_case(free.replace(*BY_NAME), Path("free.yaml"))
+    assert _as_in_the_last(case, 1, "pressure", np.array([0.0, 1.0]))
