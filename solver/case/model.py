@@ -211,10 +211,7 @@ class Case:
         return self.reference.exact if every or len(self.zones) == 1 else None
 
     def compared_with(self, key: str) -> Any:
-        """What a quantity is compared with, checked or not: the case's, or its exact solution.
-
-        None where it has nothing.
-        """
+        """What a quantity is compared with, checked or not: a value, the exact solution, None."""
         given, exact = self.reference.values.get(key), self.exact_contact
         if given is EXACT:
             return self.reference.exact

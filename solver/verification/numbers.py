@@ -18,6 +18,9 @@ from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from .samples import Reference, Sample, Sampler
 
+# Motions along a surface have less than this share of themselves along its normal.
+_ROUNDED = 1e-12
+
 
 def contact_force(solution: Solution, zone: ZoneResult, reference: Reference) -> Sample | None:
     """The force on the surface that the case lists as slave, which may be solved as master."""
@@ -136,7 +139,7 @@ def _as_in_the_last(case: Case, step: int, quantity: str, normal: np.ndarray) ->
         return False
     if (acting := _acting(case, last)) != _acting(case, here):
         return False
-    if not acting and not np.allclose(_moved(case, here, normal), _moved(case, last, normal)):
+    if not acting and not _as_far(case, here, last, normal):
         return False
     pressed = quantity == "pressure"
     return pressed or np.allclose(_way(case, step), _way(case, len(case.steps)))
@@ -151,20 +154,24 @@ def _acting(case: Case, step: Step) -> list[str]:
     return sorted(repr(one) for one in given if one[-1])
 
 
-def _moved(case: Case, step: Step, normal: np.ndarray) -> np.ndarray:
-    """How far a step moves each support and rigid body along a normal."""
+def _as_far(case: Case, here: Step, last: Step, normal: np.ndarray) -> bool:
+    """Whether two steps have all that is moved equally far along a normal (dim,).
+
+    Each up to rounding of its own motion, in any unit. Rotations move nothing along it; `normal`,
+    and what is no number, count as one.
+    """
     shares = dict(zip("xyz", normal, strict=False))
-
-    def along(move: Mapping[str, Any]) -> float:
-        """Rotations move nothing along it; `normal`, and what is no number, count as one."""
-        given = {key: value for key, value in move.items() if not key.startswith("r")}
-        numbers = ((key, v if isinstance(v, float) else 1.0) for key, v in given.items())
-        return float(sum(shares.get(key, 1.0) * value for key, value in numbers))
-
-    moves: list[tuple[str, Mapping[str, Any]]]
-    moves = [(each.name, each.fix) for each in case.supports]
+    moves: list[tuple[str, Mapping[str, Any]]] = [(each.name, each.fix) for each in case.supports]
     moves += [(body.name, body.move) for body in case.rigid.values()]
-    return np.array([factor_of(name, step) * along(move) for name, move in moves])
+    for name, move in moves:
+        given = {key: value for key, value in move.items() if not key.startswith("r")}
+        sizes = {key: v if isinstance(v, float) else 1.0 for key, v in given.items()}
+        along = sum(shares.get(key, 1.0) * size for key, size in sizes.items())
+        whole = sum(abs(size) for size in sizes.values())
+        then, now = factor_of(name, here), factor_of(name, last)
+        if abs(now * along - then * along) > _ROUNDED * (abs(now) + abs(then)) * whole:
+            return False
+    return True
 
 
 def _way(case: Case, step: int) -> np.ndarray:

@@ -1,7 +1,4 @@
-"""What is left out where a scene does not need it changes no result: --everything agrees.
-
-Random problems whose state is not uniform are in `tests.views`.
-"""
+"""What is left out where a scene does not need it changes no result: --everything agrees."""
 
 import os
 import re
@@ -13,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.case.reader import load_case
+from solver.case.reader import load_case, parse_case
 from solver.commands.cli import main
 from solver.simulation.options import Options, Shortcuts
 from solver.simulation.results.solution import Line
 from solver.simulation.simulate import simulate
 from solver.verification.results import read_result
 from solver.verification.run import mesh_of
-from tests.scenes import block_case, block_mesh
+from tests.scenes import block_case, block_mesh, moved
 
 ROOT = Path(__file__).resolve().parents[2]
 CASES = ROOT / "cases/ssnp170"
@@ -31,18 +28,18 @@ EVERYTHING = Options.everything()
 AGREED = 1e-13  # pressure over the load, displacement over its largest
 
 
-def differences(one, other):
+def differences(one, other, pressure=25.0):
     """Of pressure and displacement."""
     size = np.abs(one.displacement).max()
     moved = np.abs(one.displacement - other.displacement).max() / size
     zones = zip(one.zones, other.zones, strict=True)
-    return max(np.abs(a.multiplier - b.multiplier).max() for a, b in zones) / 25.0, moved
+    return max(np.abs(a.multiplier - b.multiplier).max() for a, b in zones) / pressure, moved
 
 
-def assert_agreed(case, mesh, swapped=False, options=EVERYTHING):
+def assert_agreed(case, mesh, swapped=False, options=EVERYTHING, within=AGREED, pressure=25.0):
     case = case.as_solved(swapped)
     short, full = simulate(case, mesh), simulate(case, mesh, options)
-    assert max(differences(short, full)) < AGREED
+    assert max(differences(short, full, pressure)) < within
     return short, full
 
 
@@ -94,6 +91,28 @@ def test_everything_on_bent_faces_that_cannot_be_plain():
     mesh = mesh_of(case)
     said = {line.skip for line in simulate(case, mesh).plan}
     assert said == {"", "status"}
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_problems_whose_state_is_not_uniform(seed):
+    """Cells, divisions, materials, loads, clearance and direction at random."""
+    random = np.random.default_rng(seed)
+    dim = int(random.choice([2, 2, 3]))
+    kinds = {2: "TRIA3 TRIA6 QUAD4 QUAD8 QUAD9", 3: "TETRA4 TETRA10 HEXA8 HEXA20 HEXA27 PENTA15"}
+    counts = random.integers(1, 3, 2) if dim == 3 else random.integers(2, 6, 2)
+    mesh = block_mesh(*random.choice(kinds[dim].split(), 2).tolist(), counts.tolist())
+    if random.random() < 0.4:
+        mesh = moved(mesh, 0.02, seed)
+    young, slope, clearance = 10 ** random.uniform(1, 4), random.uniform(0.2, 2), random.choice(2)
+    case = block_case(dim, zone=f", clearance: '{1e-3 * clearance}*x'")
+    text = case.about.source.replace("pressure: 25.0", f"pressure: '1 + {slope:.3f}*x'")
+    text = text.replace(
+        "all: {young: 2000.0", f"bottom: {{young: {young:.2f}, poisson: 0.2}}, top: {{young: 2000.0"
+    )
+    swapped = bool(random.choice(2))
+    case = parse_case(text, Path("random.yaml"))
+    largest = simulate(case.as_solved(swapped), mesh).zones[0].multiplier.max()
+    assert_agreed(case, mesh, swapped, within=1e-12, pressure=largest)
 
 
 def test_a_plane_solve_imports_nothing_of_three_dimensions_or_friction(tmp_path):

@@ -113,3 +113,11 @@ def test_a_body_that_is_free_in_a_component_is_not_pressed_by_it():
     free = RIGID.replace("force: {y: -25}", "move: {x: 1}, force: {rz: 0}")
     case = parse_case(free.replace(*BY_NAME), Path("free.yaml"))
     assert _as_in_the_last(case, 1, "pressure", np.array([0.0, 1.0]))
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_what_moves_a_side_is_seen_in_any_unit(unit):
+    down = DOWN.replace(str(-2.5 * 20 * 0.91 / 2000), repr(-0.02275 * unit))
+    case = parse_case(HELD.replace(DOWN, down).replace(*BY_NAME), Path("held.yaml"))
+    found = [_as_in_the_last(case, step, "pressure", np.array([0.0, 1.0])) for step in (1, 2, 3)]
+    assert found == [False, True, False]
