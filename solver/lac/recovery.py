@@ -249,7 +249,8 @@ def settled_means(
 
     `pressure` (k,) is the one under the loads `force` (n_dofs,) of a reconstruction; `loads` gives
     those of the reconstruction of any means, `change` by how much (k,) loads change the pressure.
-    A sweep that changes them by no more than the share `enough` of the largest is the last one.
+    A sweep after the first that changes them by no more than the share `enough` of the largest is
+    the last one. The first alone does not tell whether changes grow.
 
     Here loads that are the means, and lower them by a third of their own, leave 3/4 of them:
 
@@ -264,7 +265,7 @@ def settled_means(
         before, left = left, last - pressure
         largest = float(np.abs(left).max(initial=0.0))
         first = first if sweep else largest
-        if largest <= enough * np.abs(pressure).max(initial=0.0):
+        if sweep and largest <= enough * np.abs(pressure).max(initial=0.0):
             break
         step = _RELAXATION * left
         if sweep:

@@ -124,7 +124,7 @@ def _slips_of_all(true: Any) -> Any:
 def _pressures_among_forces(true: Any) -> Any:
     def compliance(scene: Scene, *more: Any) -> Compliance:
         found, area = true(scene, *more), scene.zones[0].operator.area.mean()
-        return Compliance(found.scatter / area, found.weight * area**2)
+        return Compliance(found.scatter / area**2, found.weight * area**4)
 
     return compliance
 
@@ -216,7 +216,7 @@ FAULTS = (
     ),
     Fault(
         "pressures-among-forces",
-        "what scatters is rounded as a pressure, beside forces",
+        "what scatters is rounded in a unit that depends on the area, beside forces",
         {"stabilised": "yes", "form": "other units"},
         problem,
         "compliance_of",

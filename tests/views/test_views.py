@@ -100,8 +100,13 @@ PLANTED = {
 }
 
 
+# What these faults do depends on rounding, so on the processor: seeds of cases that show them too.
+OTHERS = {"left": [123], "lifts": [24, 34, 39], "shrunk": [128]}
+
+
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_fault_shows_in_a_view(monkeypatch, name):
     monkeypatch.setattr(*PLANTED[name])
-    word, differences = compared(FOUND[name], most=1)
-    assert differences or word == "no solution"
+    cases = [*map(drawn, OTHERS.get(name, [])), FOUND[name]]
+    seen = (compared(case, most=1) for case in cases)
+    assert any(differences or word == "no solution" for word, differences in seen)
