@@ -30,10 +30,10 @@ from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import MIN_COVERAGE, gap_operator
 from .reconstruction import Reconstruction, form_of
-from .recovery import Recovery, RecoveryRequest, with_status
+from .recovery import Recovery, RecoveryRequest, grows, with_status
 from .roughness import Smooth, smoothed
 from .saddle_point import SaddlePoint, numbered
-from .status import find_status
+from .status import Trial, find_status
 
 Boundary = tuple[skfem.Mesh, Names]
 Recovered = Literal["automatic", "linear", "quadratic", "smooth"]
@@ -96,6 +96,7 @@ class _UnderRecovery(NamedTuple):
     """A system under a recovered pressure, whose `fit` to the `means` (k,) of facets it is."""
 
     system: SaddlePoint
+    trial: Trial
     closed: np.ndarray
     fit: Reconstruction
     means: np.ndarray
@@ -289,7 +290,8 @@ class LocalAverageContact:
         ValueError
             For an unknown form.
         RuntimeError
-            Where the contact status does not settle under the recovered pressure.
+            Where status or pressure do not settle under the recovered pressure: a body that is all
+            but free to turn is turned further by each sweep.
         """
         if not isinstance(state, ContactState):
             raise ValueError(f"state = {type(state).__name__}: must be a ContactState")
@@ -302,14 +304,16 @@ class LocalAverageContact:
         system, closed, size = state._system, state.closed, len(state._system.force)
         added = numbered(recovery.loads, self._unknown, size).T
 
-        def correct(closed: np.ndarray) -> _UnderRecovery:
+        def correct(closed: np.ndarray) -> _UnderRecovery | None:
             fit = recovery.reconstruction(closed)
-            means = system.settled(closed, added @ fit.matrix, shape.sweeps)
-            return _UnderRecovery(system.under(added @ (fit.matrix @ means)), closed, fit, means)
+            means, first = system.settled(closed, added @ fit.matrix, shape.sweeps)
+            under = system.under(added @ (fit.matrix @ means))
+            trial = under.trial(closed)
+            diverged = grows(first, trial.pressure - means, trial)
+            return None if diverged else _UnderRecovery(under, trial, closed, fit, means)
 
         def wrong(found: _UnderRecovery) -> bool:
-            violation = found.system.trial(found.closed).violation(found.closed)
-            return bool((self._opposed & (violation > 1)).any())
+            return bool((self._opposed & (found.trial.violation(found.closed) > 1)).any())
 
         def again(found: _UnderRecovery) -> np.ndarray:
             system, opposed = found.system, self._opposed
@@ -318,7 +322,7 @@ class LocalAverageContact:
 
         settled = with_status(closed, correct, wrong, again)
         if settled is None:
-            raise SolveError("the contact status does not settle under the recovered pressure")
+            raise SolveError("status or pressure do not settle under the recovered pressure")
         found = _state(settled.system, settled.closed, state.iterations)
         applied = shape.degree == 2 and shape.keeps_means
         coefficients = settled.fit.matrix @ (settled.means if applied else found.pressure)

@@ -26,9 +26,13 @@ from .friction import Tangent, along_faces, levers, tangents
 from .partners import Surface
 from .reconstruction import Form, Local, Moments, Reconstruction, reconstruct
 from .segments import Segments
+from .status import Trial
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
 _RELAXATION = 0.87
+# Sweeps diverge where one changes so many times what the first did, and more than this share of the
+# pressure, which is rounding.
+_GROWTH, _ROUNDING = 10, 1e-9
 # How often a status that the recovered pressure changes is found anew.
 _ROUNDS = 3
 S = TypeVar("S")
@@ -274,3 +278,30 @@ def settled_means(
             step -= share * (moved + _RELAXATION * fell)
         pressure, moved, force = pressure + step, step, following
     return pressure, first
+
+
+def grows(first: float, change: np.ndarray, found: Trial) -> bool:
+    """Whether a sweep changed pressures by a `change` (k,) far above the `first`, and rounding.
+
+    Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and the
+    sweeps diverge. `found` is what the sweep led to.
+
+    >>> none = np.zeros(1)
+    >>> found = Trial(pressure=np.ones(1), gap=none, pressure_limit=none, gap_limit=none)
+    >>> [grows(first, np.full(1, 1e-3), found) for first in (1e-5, 1e-3)]
+    [True, False]
+    """
+    size = float(np.abs(change).max(initial=0.0))
+    return size > max(_GROWTH * first, negligible(found, _ROUNDING))
+
+
+def negligible(found: Trial, share: float) -> float:
+    """A change of pressure that is no more than a `share` of the largest, or than rounding.
+
+    >>> none = np.zeros(1)
+    >>> found = Trial(pressure=np.array([-2.0]), gap=none, pressure_limit=none, gap_limit=none)
+    >>> negligible(found, 1e-9)
+    2e-09
+    """
+    known = found.pressure_limit[np.isfinite(found.pressure_limit)].max(initial=0.0)
+    return float(max(share * np.abs(found.pressure).max(initial=0.0), known))

@@ -72,14 +72,16 @@ class SaddlePoint:
         other.load = self.load + force[self.free]
         return other
 
-    def settled(self, closed: np.ndarray, loads: csr_matrix, sweeps: int) -> np.ndarray:
-        """The pressures (k,) to be reconstructed; `loads` (N, k): forces that one of them adds."""
+    def settled(
+        self, closed: np.ndarray, loads: csr_matrix, sweeps: int
+    ) -> tuple[np.ndarray, float]:
+        """See `settled_means`; `loads` (N, k): forces that a pressure of one adds."""
         before = self.trial(closed).pressure
 
         def change(force: np.ndarray) -> np.ndarray:
             return np.asarray(self.under(force).trial(closed).pressure - before)
 
-        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)[0]
+        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)
 
     def _factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
         key = closed.tobytes()

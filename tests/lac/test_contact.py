@@ -311,6 +311,20 @@ def test_a_linear_pressure_is_recovered(kind, form, better):
     assert recovered.error == pytest.approx(np.full(12, b * length * np.sqrt(length / 12)), rel=0.1)
 
 
+@pytest.mark.parametrize("form", ["linear", "smooth"])
+def test_a_body_that_is_all_but_free_to_turn_is_not_recovered(form):
+    """It stands on one row of facets: sweeps from rounded pressures turn it ever further."""
+    lower = block(skfem.MeshHex1, 3, 4, 0.0)
+    upper = block(skfem.MeshHex1, 3, 3, 25.0, rows=1)
+    inner = (upper.p[0] > 0) & (upper.p[0] < 50)
+    upper.p[0, inner] += np.random.default_rng(1).uniform(-0.2, 0.2, inner.sum())
+    contact = LocalAverageContact((upper, "bottom"), (lower, "top"))
+    state, *_ = pressed(contact, lower, 3, free=True)
+    assert state.pressure == pytest.approx(np.full(3, 25.0), rel=1e-8)
+    with pytest.raises(RuntimeError, match="status or pressure do not settle"):
+        contact.recover(state, form)
+
+
 def test_an_unknown_form_is_refused():
     lower, upper = good()
     contact = LocalAverageContact((upper, "bottom"), (lower, "top"))

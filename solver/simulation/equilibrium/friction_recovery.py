@@ -18,11 +18,11 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.friction import of_tractions
-from ...lac.recovery import Recovery, settled_means
+from ...lac.recovery import Recovery, grows, negligible, settled_means
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, grows, negligible, with_estimate
+from .recovery import ZoneFit, fit_of, with_estimate
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -176,7 +176,7 @@ class _Sweeping:
         found = self._under(np.sum(forces, axis=0))
         left = found.pressure - values
         self._refuse_growth(left, found)
-        if enough and np.abs(left).max(initial=0.0) > negligible(found, _UNSETTLED):
+        if enough and np.abs(left).max(initial=0.0) > negligible(found.trial, _UNSETTLED):
             raise SolveError("the sweeps do not settle")
         fields = {}
         for each, force in zip(loads, forces, strict=True):
@@ -202,7 +202,7 @@ class _Sweeping:
 
     def _refuse_growth(self, change: np.ndarray, state: Equilibrium) -> None:
         """SolveError where a sweep changed far more than the first one."""
-        size = float(np.abs(change).max(initial=0.0))
-        self.first = size if self.first is None else self.first
-        if grows(self.first, size, state):
+        if self.first is None:
+            self.first = float(np.abs(change).max(initial=0.0))
+        if grows(self.first, change, state.trial):
             raise SolveError("the sweeps diverge")

@@ -13,15 +13,12 @@ import numpy as np
 
 from ...case.acting import Step
 from ...lac.reconstruction import Reconstruction
-from ...lac.recovery import Recovery, settled_means, with_status
+from ...lac.recovery import Recovery, grows, settled_means, with_status
 from ..scene.scene import ZoneScene
 from .problem import ContactProblem
 from .state import Equilibrium, PressureField
 
 _LOG = logging.getLogger(__name__)
-# Sweeps diverge where one changes so many times what the first did, and more than this share of the
-# pressure, which is rounding.
-_GROWTH, _ROUNDING = 10, 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,22 +111,6 @@ def with_estimate(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium
     return replace(state, fields=fields)
 
 
-def grows(first: float, change: float, state: Equilibrium) -> bool:
-    """Whether a sweep that led to a state changed far more than the `first` one, and than rounding.
-
-    Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and the
-    sweeps diverge.
-    """
-    return bool(change > max(_GROWTH * first, negligible(state, _ROUNDING)))
-
-
-def negligible(state: Equilibrium, share: float) -> float:
-    """A change of pressure that is no more than a `share` of the largest, or than rounding."""
-    limit = state.trial.pressure_limit
-    known = limit[np.isfinite(limit)].max(initial=0.0)
-    return float(max(share * np.abs(state.pressure).max(initial=0.0), known))
-
-
 def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
     """The reconstruction of a zone among the `closed` (k,) of all multipliers."""
     recovery = zone.operator.recovery
@@ -158,7 +139,7 @@ def _corrected(
     added = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
     correction = np.sum(added, axis=0).reshape(state.correction.shape)
     state = problem.corrected(state, correction)
-    if grows(first, float(np.abs(state.pressure - pressure).max(initial=0.0)), state):
+    if grows(first, state.pressure - pressure, state.trial):
         return None
     read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
     return _Corrected(state, zones, read, added)
