@@ -46,6 +46,7 @@ CAUSES = {
     "coordinates": "coordinates far from the origin",
     "stress": "strain: a difference of rounded displacements",
     "slender": "small faces of slender cells",
+    "arms": "bodies that are all but free to move",
     "sums": "cells with many nodes",
 }
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from solver import solve_case
 from solver.case.reader import load_case, parse_case
@@ -216,9 +217,26 @@ def test_a_pressure_that_is_rounding_is_judged_by_what_loads_cause():
 
     def error(share):
         about = state.iterate, rounding(state.iterate), share * state.pressure, assembled.diagonal
-        return estimate(*about, assembled._rough, left, state.force_scale).estimate
+        about += assembled._rough, assembled.unsupported
+        return estimate(*about, left, state.force_scale).estimate
 
     assert left / 10 < error(1.0) < 10 * left
     assert error(1e-5) > 1e4 * error(1.0)
     assert error(1e-11) < 10 * left
     assert error(1e-16) < 10 * left
+
+
+def test_a_body_that_is_all_but_free_to_turn():
+    """It stands on one row of macro-elements that are all but in line: its loads have long arms."""
+    content = yaml.safe_load((CASES / "friction-patch/m-stick.yaml").read_text())
+    content["mesh"]["bottom"] |= {"cells": "PENTA6", "divisions": [1, 3, 1], "contact": "QUAD4"}
+    content["mesh"]["top"] |= {"cells": "PENTA15", "divisions": [3, 3, 1], "contact": "TRIA6"}
+    content["transform"] = {"perturb": 0.05}
+    solution = solve_case(content).solution
+    accuracy, (zone,) = solution.quality.accuracy, solution.zones
+    error = np.abs(zone.multiplier / 25.0 - 1).max()
+    assert max(accuracy, key=lambda name: accuracy[name]) == "arms"
+    assert 1e-14 < error < 10 * accuracy["arms"]
+    assert accuracy["arms"] < USELESS * error
+    others = {name: value for name, value in accuracy.items() if name != "arms"}
+    assert error > 10 * Accuracy(others).estimate

@@ -14,6 +14,8 @@ other steps could cause:
                  faces, are pushed apart
     stress       as forces, for the stress in the bodies
     slender      the errors of forces seen on the small faces of slender cells, as a stress there
+    arms         a body that is all but free to move is held by pressures on short arms, which
+                 balance the rounding of its loads
     sums         a stress is a sum over the nodes of a cell, of gradients that are such sums
 
 The largest one counts.
@@ -46,6 +48,8 @@ LEAST_DIGITS = 4
 # the second share of the displacements they are the difference of, or below so many roundings of
 # the coordinates, are so too; and pressures below so many times their estimated error.
 _NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
+# Motions that gaps resist by less than this share of what they resist most are refused, or of none.
+_UNHELD = 1e-8
 
 AT_REST = 1e-12
 """Forces below this share of the loads of all steps are none."""
@@ -56,6 +60,7 @@ _REASONS = {
     "coordinates": "the coordinates are rounded too far from the origin for cells so small",
     "stress": "the strains are lost in the rounding of the displacements",
     "slender": "on the small faces of slender cells the rounding of forces is a large stress",
+    "arms": "a body is all but free to move, and pressures on short arms hold it",
     "sums": "its cells have too many nodes",
 }
 
@@ -102,6 +107,24 @@ def pressure_of_gaps(gaps: sparse.csr_matrix, noise: np.ndarray, stiffness: np.n
     """The largest pressure that errors `noise` (m,) of ∫ gap bring up, by `stiffness` (n_dofs,)."""
     row, column, size = _largest(gaps)
     return float((noise[row] * stiffness[column] / size**2).max(initial=0.0))
+
+
+def pressures_of_resultants(
+    gaps: sparse.csr_matrix, motions: sparse.csr_matrix, resultants: np.ndarray
+) -> np.ndarray:
+    """The largest pressures (c,) that balance `resultants` (r, c) of any sign along `motions`.
+
+    No support resists these (n_dofs, r), but `gaps` (m, n_dofs).
+
+    A force, and a moment that two gaps hold at arms of 0.001:
+
+    >>> gaps = sparse.csr_matrix(np.eye(2, 3))
+    >>> motions = sparse.csr_matrix([[1.0, 0.001], [1.0, -0.001], [1.0, 1.0]])
+    >>> pressures_of_resultants(gaps, motions, np.eye(2)).round(9).tolist()
+    [0.5, 500.0]
+    """
+    balanced = np.linalg.pinv((gaps @ motions).toarray().T, _UNHELD)
+    return np.asarray(np.sqrt((balanced**2 @ resultants**2).max(axis=0, initial=0.0)))
 
 
 @dataclass(frozen=True)
@@ -211,13 +234,15 @@ def estimate(
     pressure: np.ndarray,
     diagonal: np.ndarray,
     rough: Roughness,
+    loose: sparse.csr_matrix,
     residual: float,
     force_scale: float,
 ) -> Accuracy:
     """How many digits rounding leaves in the pressure (k,) of an iterate.
 
-    `diagonal` (n_dofs,) of the stiffness, `rough` what rounded coordinates do to the mesh,
-    `residual` relative to the size of the forces at work.
+    `diagonal` (n_dofs,) of the stiffness, `rough` what rounded coordinates do to the mesh, `loose`
+    (n_dofs, r) motions that contact alone resists, `residual` relative to the size of the forces at
+    work.
     """
     scene, constraints, closed = iterate.scene, iterate.constraints, iterate.closed
     forces, unit = rounded.forces, _unit(iterate)
@@ -230,20 +255,37 @@ def estimate(
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
+    summed, arms = _of_resultants(iterate, forces, pressure, loose)
     # Taken off a stress in double precision, whatever the iterate's is.
     in_double = max((term.rounded[1] for term in iterate.terms), default=0.0)
     errors = {
-        "forces": pressure_of_forces(moving, noise),
+        "forces": max(pressure_of_forces(moving, noise), summed),
         "gap": pressure_of_gaps(moving, rounded.gaps[closed], diagonal),
         "coordinates": tilted + rough.stress(scene.blocks, moved),
         "stress": max(unit * iterate.sizes.highest, EPSILON * in_double),
         "slender": unit * iterate.sizes.slender,
+        "arms": arms,
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
     if (worst := max(errors.values())) > 10.0**-LEAST_DIGITS * scale:
         loaded = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
         scale = max(scale, _scale_of_rest(iterate, scale, worst, loaded))
     return Accuracy({name: error / scale for name, error in errors.items()})
+
+
+def _of_resultants(
+    iterate: ContactIterate, forces: np.ndarray, pressure: np.ndarray, loose: sparse.csr_matrix
+) -> tuple[float, float]:
+    """The errors of pressure by the resultants, along `loose` motions, of rounded sums and loads.
+
+    `forces` (n,) are the errors of internal forces. Coordinates are rounded as loads are.
+    """
+    constraints = iterate.constraints
+    acting = np.abs(iterate.force).ravel() + abs(constraints.gaps).T @ np.abs(pressure)
+    of_sums = loose.power(2).T @ np.repeat(forces, iterate.scene.points.shape[1]) ** 2
+    resultants = np.stack([np.sqrt(of_sums), EPSILON * (abs(loose).T @ acting)], axis=1)
+    found = pressures_of_resultants(constraints.gaps[iterate.closed], loose, resultants)
+    return float(found[0]), float(found[1])
 
 
 def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float, loaded: float) -> float:

@@ -327,7 +327,8 @@ class ContactProblem:
             pressure = np.zeros(len(start.closed))
             pressure[start.closed] = multiplier
             rounded, diagonal = rounding(iterate), self.diagonal
-            accuracy = estimate(iterate, rounded, pressure, diagonal, self._rough, residual, scale)
+            mesh = diagonal, self._rough, self.unsupported
+            accuracy = estimate(iterate, rounded, pressure, *mesh, residual, scale)
             extends = refine and safeguards.extended and not start.extended
             if extends and accuracy.of_sums > _EXTEND:
                 start = replace(iterate, extended=True)
