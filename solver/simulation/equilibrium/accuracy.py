@@ -48,8 +48,10 @@ LEAST_DIGITS = 4
 # the second share of the displacements they are the difference of, or below so many roundings of
 # the coordinates, are so too; and pressures below so many times their estimated error.
 _NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
-# Motions that gaps resist by less than this share of what they resist most are refused, or of none.
+# A motion that gaps resist by no more than this share of what they resist most is not held by them.
 _UNHELD = 1e-8
+# Rows of the motions of bodies, of which copies are made, at once.
+_AT_ONCE = 1 << 20
 
 AT_REST = 1e-12
 """Forces below this share of the loads of all steps are none."""
@@ -255,7 +257,9 @@ def estimate(
     pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
-    summed, arms = _of_resultants(iterate, forces, pressure, loose)
+    summed = arms = 0.0
+    if loose.shape[1]:
+        summed, arms = _of_resultants(iterate, forces, pressure, loose)
     # Taken off a stress in double precision, whatever the iterate's is.
     in_double = max((term.rounded[1] for term in iterate.terms), default=0.0)
     errors = {
@@ -281,9 +285,15 @@ def _of_resultants(
     `forces` (n,) are the errors of internal forces. Coordinates are rounded as loads are.
     """
     constraints = iterate.constraints
+    noise = np.repeat(forces, iterate.scene.points.shape[1])
     acting = np.abs(iterate.force).ravel() + abs(constraints.gaps).T @ np.abs(pressure)
-    of_sums = loose.power(2).T @ np.repeat(forces, iterate.scene.points.shape[1]) ** 2
-    resultants = np.stack([np.sqrt(of_sums), EPSILON * (abs(loose).T @ acting)], axis=1)
+    squares, of_loads = np.zeros((2, loose.shape[1]))
+    for first in range(0, len(noise), _AT_ONCE):
+        rows = slice(first, first + _AT_ONCE)
+        some = abs(loose[rows])
+        squares += some.power(2).T @ noise[rows] ** 2
+        of_loads += EPSILON * (some.T @ acting[rows])
+    resultants = np.stack([np.sqrt(squares), of_loads], axis=1)
     found = pressures_of_resultants(constraints.gaps[iterate.closed], loose, resultants)
     return float(found[0]), float(found[1])
 
