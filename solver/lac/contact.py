@@ -276,7 +276,8 @@ class LocalAverageContact:
         system = SaddlePoint(self, stiffness, force, B, imposed, held, ground)
         opposed = self._opposed
         found = find_status(system.trial, opposed, opposed, self.covered, system.stiffness)
-        return _state(system, found.closed, found.iterations)
+        trial = system.trial(found.closed)
+        return _state(system, trial, found.closed, found.iterations)
 
     def recover(self, state: ContactState, form: Recovered = "automatic") -> RecoveredState:
         """A pressure of second order (`quadratic`: of third) from one constant for each facet.
@@ -323,16 +324,15 @@ class LocalAverageContact:
         settled = with_status(closed, correct, wrong, again)
         if settled is None:
             raise SolveError("status or pressure do not settle under the recovered pressure")
-        found = _state(settled.system, settled.closed, state.iterations)
+        found = _state(settled.system, settled.trial, settled.closed, state.iterations)
         applied = shape.degree == 2 and shape.keeps_means
         coefficients = settled.fit.matrix @ (settled.means if applied else found.pressure)
         error = recovery.error(coefficients, settled.fit)
         return RecoveredState(found, error, recovery, coefficients)
 
 
-def _state(system: SaddlePoint, closed: np.ndarray, iterations: int) -> ContactState:
-    """The state with these facets closed."""
-    found = system.trial(closed)
+def _state(system: SaddlePoint, found: Trial, closed: np.ndarray, iterations: int) -> ContactState:
+    """The state that the system's last trial `found`, with these facets closed."""
     return ContactState(
         system.displacement, found.pressure, found.gap, closed, iterations, _system=system
     )

@@ -252,14 +252,18 @@ def estimate(
     moved = iterate.displacement.total.reshape(scene.points.shape)
     if scale == 0:
         return Accuracy({"forces": float(forces.max()) / max(force_scale, _at_rest(iterate))})
-    noise = np.repeat(forces, scene.points.shape[1]) + residual * force_scale
-    moving = constraints.moving[closed]
-    pushed = rough.gap(constraints.gaps[closed], moved) * constraints.covered[closed]
+    by_unknown = np.repeat(forces, scene.points.shape[1])
+    noise = by_unknown + residual * force_scale
+    moving, gaps = constraints.moving[closed], constraints.gaps[closed]
+    pushed = rough.gap(gaps, moved) * constraints.covered[closed]
     tilted = scale * (rough.strain + float(rough.tilt.max()))
     tilted += pressure_of_gaps(moving, pushed, diagonal)
     summed = arms = 0.0
     if loose.shape[1]:
-        summed, arms = _of_resultants(iterate, forces, pressure, loose)
+        pushes = abs(gaps).T @ np.abs(pressure[closed])
+        acting = np.abs(iterate.force).ravel() + pushes
+        known = _resultants(loose, by_unknown, EPSILON * acting)
+        summed, arms = pressures_of_resultants(gaps, loose, known).tolist()
     # Taken off a stress in double precision, whatever the iterate's is.
     in_double = max((term.rounded[1] for term in iterate.terms), default=0.0)
     errors = {
@@ -277,25 +281,18 @@ def estimate(
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
-def _of_resultants(
-    iterate: ContactIterate, forces: np.ndarray, pressure: np.ndarray, loose: sparse.csr_matrix
-) -> tuple[float, float]:
-    """The errors of pressure by the resultants, along `loose` motions, of rounded sums and loads.
+def _resultants(loose: sparse.csr_matrix, sums: np.ndarray, loads: np.ndarray) -> np.ndarray:
+    """The resultants (r, 2) along `loose` motions of the errors (n_dofs,) of sums and of loads.
 
-    `forces` (n,) are the errors of internal forces. Coordinates are rounded as loads are.
+    Errors of sums have any sign. Those of loads and of coordinates may all have the same.
     """
-    constraints = iterate.constraints
-    noise = np.repeat(forces, iterate.scene.points.shape[1])
-    acting = np.abs(iterate.force).ravel() + abs(constraints.gaps).T @ np.abs(pressure)
     squares, of_loads = np.zeros((2, loose.shape[1]))
-    for first in range(0, len(noise), _AT_ONCE):
+    for first in range(0, len(sums), _AT_ONCE):
         rows = slice(first, first + _AT_ONCE)
         some = abs(loose[rows])
-        squares += some.power(2).T @ noise[rows] ** 2
-        of_loads += EPSILON * (some.T @ acting[rows])
-    resultants = np.stack([np.sqrt(squares), of_loads], axis=1)
-    found = pressures_of_resultants(constraints.gaps[iterate.closed], loose, resultants)
-    return float(found[0]), float(found[1])
+        squares += some.power(2).T @ sums[rows] ** 2
+        of_loads += some.T @ loads[rows]
+    return np.stack([np.sqrt(squares), of_loads], axis=1)
 
 
 def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float, loaded: float) -> float:

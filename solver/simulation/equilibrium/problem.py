@@ -327,8 +327,9 @@ class ContactProblem:
             pressure = np.zeros(len(start.closed))
             pressure[start.closed] = multiplier
             rounded, diagonal = rounding(iterate), self.diagonal
-            mesh = diagonal, self._rough, self.unsupported
-            accuracy = estimate(iterate, rounded, pressure, *mesh, residual, scale)
+            accuracy = estimate(
+                iterate, rounded, pressure, diagonal, self._rough, self.unsupported, residual, scale
+            )
             extends = refine and safeguards.extended and not start.extended
             if extends and accuracy.of_sums > _EXTEND:
                 start = replace(iterate, extended=True)
