@@ -32,9 +32,10 @@ def where_zones_meet(model: Model, number: int, places: np.ndarray) -> np.ndarra
     """Which places (k,) of a zone are on another one too: a reference has one value there."""
     found = np.zeros(len(places), dtype=bool)
     for zone in (zone for i, zone in enumerate(model.solution.zones) if i != number):
-        faces = zone.faces_of("slave")
-        for i in np.flatnonzero(_is_on(model, zone, places)):
-            found[i] |= locate(model.points, faces, places[i])[0].distance < NEAR * model.length
+        here = np.flatnonzero(_is_on(model, zone, places))
+        if len(here):
+            at = locate(model.points, zone.faces_of("slave"), places[here]).nearest
+            found[here] |= at.distance < NEAR * model.length
     return found
 
 

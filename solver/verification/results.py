@@ -156,13 +156,15 @@ def _layout(file: h5py.File) -> str:
     """A hash of names, types and shapes of all data sets and of their attributes."""
     lines: list[str] = []
 
-    def add(name: str, item: h5py.HLObject) -> None:
-        if isinstance(item, h5py.Dataset):
-            lines.append(f"{name} {item.dtype} {item.shape}")
-        attributes = (item.attrs.get_id(key) for key in item.attrs)
-        lines.extend(f"{name} {at.name!r} {at.dtype} {at.shape}" for at in attributes)
+    def add(name: bytes) -> None:
+        item, place = h5py.h5o.open(file.id, name), name.decode()
+        if isinstance(item, h5py.h5d.DatasetID):
+            lines.append(f"{place} {item.dtype} {item.shape}")
+        for number in range(h5py.h5a.get_num_attrs(item)):
+            at = h5py.h5a.open(item, index=number)
+            lines.append(f"{place} {at.name!r} {at.dtype} {at.shape}")
 
-    file.visititems(add)
+    h5py.h5o.visit(file.id, add)  # `visititems` takes half as long again
     return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
 
 

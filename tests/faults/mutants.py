@@ -142,8 +142,8 @@ MUTANTS = (
            "simulation.scene.holdings.cyclic:copies_of", changed(
                lambda found: {k: replace(c, turn=c.turn.T) for k, c in found.items()})),
     Mutant("probe-nodes", "probes take the nodes of a cell in the wrong order", PLATEN,
-           "simulation.scene.probing:locate", changed(
-               lambda found: [replace(one, nodes=np.roll(one.nodes, 1)) for one in found])),
+           "simulation.results.results:cell_at",
+           changed(lambda found: (np.roll(found[0], 1), found[1]))),
     Mutant("traction-lost", "the exact solution's traction does not act", CYLINDER,
            "simulation.scene.attributes:Attributes._exact_force", changed(np.zeros_like)),
     Mutant("force-share", "a force on a group is 1 % too large", FORCES,

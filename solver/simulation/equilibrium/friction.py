@@ -9,6 +9,7 @@ for large coefficients there may be others.
 import logging
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,13 +22,22 @@ from .problem import ContactProblem
 from .state import Equilibrium, Friction
 
 _LOG = logging.getLogger(__name__)
-# Corrections of the jumps, and the fault of the law by the largest force that ends them; they end
-# as well where it falls by less than the half. A larger fault than the last one is no state.
-_CORRECTIONS, _EXACT, _SLOW, _TOLERATED = 6, 1e-15, 0.5, 1e-6
+# Corrections of the jumps, and the fault of the law by the largest force that ends them, or ends
+# those of a state on the way; they end as well where it falls by less than the half. A larger fault
+# than the last one is no state.
+_CORRECTIONS, _EXACT, _ON_THE_WAY, _SLOW, _TOLERATED = 6, 1e-15, 1e-12, 0.5, 1e-6
 _UNHELD = (
     "once its contact opens or slips: the loads part the bodies or overcome friction, or a support "
     "is missing"
 )
+
+
+class _Unmoved(NamedTuple):
+    """Pressures (k,) with all closed and stuck under `correction` (n, dim), the force at work."""
+
+    correction: np.ndarray
+    pressure: np.ndarray
+    at_work: float
 
 
 class Search:
@@ -50,32 +60,53 @@ class Search:
         self.last = before.pressure if before else None
         self.closed = before.status.closed if before else None
         self.count = 0
+        self._unmoved: _Unmoved | None = None
 
-    def settled(self, correction: np.ndarray | float = 0.0) -> Equilibrium:
+    def settled(
+        self, correction: np.ndarray | float = 0.0, on_the_way: bool = False
+    ) -> Equilibrium:
         """Equilibrium under the forces `correction` (n, dim) beside those of the constants.
 
-        Raises SolveError where none is found.
+        To the last digits, or to some if it is `on_the_way` to another one. Raises SolveError where
+        none is found.
         """
         base, contact = self.problem.constraints, self._contact
         area = base.covered[base.eligible]
-        start = self._imposed(np.zeros(len(area)), correction)
         # Bodies that went on slip by about as much.
         gone = np.where(base.normal, 0.0, base.initial)[base.eligible] / area
         last = None if self.last is None else area * self.last[base.eligible]
-        at_rest = area * start.pressure[base.eligible]
-        at_work = forces_at_work(self.problem.scene, start.displacement)
+        pressure, at_work = self._where_nothing_moves(correction)
+        at_rest = area * pressure[base.eligible]
         solution = contact.solve(at_rest, gone, last, at_work)
         if solution is None or self._is_nothing(solution[0], at_work):
             return self._resting(at_work, correction)
         forces, z, steps = solution
         _LOG.info("friction: %d Newton steps", steps)
         scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
-        corrected = self._corrected(z, scale, correction)
+        enough = _ON_THE_WAY if on_the_way else _EXACT
+        corrected = self._corrected(z, scale, correction, enough)
         if corrected is None:
             return self._resting(at_work, correction)
         found, forces, z = corrected
         found = self._freed(forces, z, correction) or found
         return self._with_status(found, *contact.statuses(forces, z))
+
+    def _where_nothing_moves(self, correction: np.ndarray | float) -> tuple[np.ndarray, float]:
+        """Pressures (k,) with all closed and stuck, and the force at work.
+
+        Those under other forces follow from the first ones: what is found with them is corrected.
+        """
+        if self._unmoved is None:
+            found = self._imposed(
+                np.zeros(int(self.problem.constraints.eligible.sum())), correction
+            )
+            at_work = forces_at_work(self.problem.scene, found.displacement)
+            self._unmoved = _Unmoved(found.correction, found.pressure, at_work)
+            return found.pressure, at_work
+        known = self._unmoved
+        more = np.ravel(correction - known.correction)
+        change = self.problem.pressure_change(self.problem.constraints.eligible, more)
+        return known.pressure + change, known.at_work
 
     def _is_nothing(self, forces: np.ndarray, at_work: float) -> bool:
         """Whether nothing presses."""
@@ -102,12 +133,12 @@ class Search:
         return self._with_status(replace(found, trial=trial), closed, slipping)
 
     def _corrected(
-        self, z: np.ndarray, scale: float, correction: np.ndarray | float
+        self, z: np.ndarray, scale: float, correction: np.ndarray | float, enough: float
     ) -> tuple[Equilibrium, np.ndarray, np.ndarray] | None:
         """Equilibrium with jumps from z (r,) on that fulfil the law, its forces (r,) and z (r,).
 
         None where they do not come to fulfil it. `scale`: of the forces that would close
-        everything, or that are at work.
+        everything, or that are at work; `enough`: the fault, by this, that ends it.
         """
         base, last = self.problem.constraints, np.inf
         for _ in range(_CORRECTIONS):
@@ -115,7 +146,7 @@ class Search:
             forces = (base.covered * found.pressure)[base.eligible]
             following, fault = self._contact.corrected(forces, z, scale)
             _LOG.info("friction: law off by %.1e", fault)
-            if fault < _EXACT or fault > _SLOW * last:
+            if fault < enough or fault > _SLOW * last:
                 break
             if fault > _TOLERATED and (anew := self._contact.again(forces, z)) is not None:
                 following = anew

@@ -184,8 +184,8 @@ class _Sweeping:
             fields[each.zone.zone.name] = each.fit.field(read, force, each.tractions(values))
         return replace(found, couple=sum(couples, np.zeros(3)), fields=fields)
 
-    def _under(self, force: np.ndarray) -> Equilibrium:
-        return self.search.settled(force.reshape(self.shape))
+    def _under(self, force: np.ndarray, on_the_way: bool = False) -> Equilibrium:
+        return self.search.settled(force.reshape(self.shape), on_the_way)
 
     def _added(self, values: np.ndarray) -> np.ndarray:
         """The forces (n_dofs,) of the reconstruction of pressures and tractions (k,)."""
@@ -195,7 +195,7 @@ class _Sweeping:
     def _change(self, force: np.ndarray) -> np.ndarray:
         """By how much (k,) further forces (n_dofs,) change pressures and tractions."""
         self.force = self.force + force
-        last, self.state = self.state, self._under(self.force)
+        last, self.state = self.state, self._under(self.force, on_the_way=True)
         found = self.state.pressure - last.pressure
         self._refuse_growth(found, self.state)
         return found

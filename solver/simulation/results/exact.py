@@ -36,6 +36,7 @@ def pressure_on(
 ) -> np.ndarray:
     """The pressure (s, q) on faces (s, n_nodes) of macro-elements (s,), at reference points (q, t).
 
+    Each face may have points of its own: (s, q, t).
     The recovered one, or that of each macro-element, or, between multipliers at nodes, linear (or
     what the shape functions make of it where all nodes of a face have one).
     """
@@ -43,12 +44,13 @@ def pressure_on(
         places = shape_functions(name).values(reference) @ points[nodes]
         return zone.recovered.values(zone.multiplier, owner, places)
     if zone.nodal is None:
-        return np.repeat(zone.multiplier[owner][:, None], len(reference), axis=1)
+        return np.repeat(zone.multiplier[owner][:, None], reference.shape[-2], axis=1)
     kind = cell_type(name)
     at_all = np.isin(nodes, zone.nodal.nodes).all()
     own = nodes if at_all else nodes[:, : kind.n_vertices]
     pressure = zone.nodal.multiplier[np.searchsorted(zone.nodal.nodes, own)]
-    return pressure @ shape_functions(name if at_all else kind.skeleton).values(reference).T
+    values = shape_functions(name if at_all else kind.skeleton).values(reference)
+    return (values @ pressure[:, :, None])[..., 0]
 
 
 class ExactValues:

@@ -270,22 +270,21 @@ def probed(
             nodes = scene.named.probed[name]
             moved, tensor = displacement[nodes], stress[nodes]
         else:
-            cell = cell_at(scene, name)
-            moved, tensor = (cell.weights @ f[cell.nodes][None] for f in (displacement, stress))
+            nodes, shares = cell_at(scene, name)
+            moved, tensor = (shares @ f[nodes][None] for f in (displacement, stress))
         found[name] = ProbeResult(places + scene.coordinates.origin, moved, tensor, none)
     return found
 
 
 def _on_surface(scene: Scene, zone: ZoneResult, name: str, places: np.ndarray) -> ProbeResult:
     """The contact pressure where a zone's slave surface is nearest to local places (k, dim)."""
-    pressure, faces = np.empty(len(places)), zone.faces_of("slave")
-    points = scene.points + scene.coordinates.origin
-    for i, face in enumerate(faces_at(scene, name, faces)):
-        owner = zone.faces[face.block][2][face.number]
-        nodes, reference = face.nodes[None], face.reference[None]
-        pressure[i] = pressure_on(
-            points, zone, face.type.name, nodes, np.array([owner]), reference
-        )[0, 0]
+    pressure, points = np.empty(len(places)), scene.points + scene.coordinates.origin
+    found = faces_at(scene, name, zone.faces_of("slave"))
+    for block, (kind, nodes, owner) in enumerate(zone.faces):
+        here = found.block == block
+        face, reference = found.number[here], found.reference[here][:, None]
+        at = pressure_on(points, zone, kind, nodes[face], owner[face], reference)
+        pressure[here] = at[:, 0]
     none = np.full((len(places), 6), np.nan)
     return ProbeResult(
         places + scene.coordinates.origin, none[:, : places.shape[1]], none, pressure

@@ -191,9 +191,8 @@ class Attributes(CutGroups):
 
     def with_solution(self, solution: ExactSolution) -> Attributes:
         """The same with the fields of another exact solution."""
-        return Attributes(
-            self.case.with_exact(solution), self.mesh, self.cut, self.zones, self.origin
-        )
+        case = self.case.with_exact(solution)
+        return Attributes(case, self.mesh, self.cut, self.zones, self.origin).as_in(self)
 
     def _state(self, solution: ExactSolution) -> tuple[np.ndarray, np.ndarray]:
         then = self.with_solution(solution)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import meshio
 import numpy as np
@@ -73,6 +73,13 @@ class CutGroups:
         self.case, self.mesh, self.cut = case, mesh, cut_mesh
         self.points, self.origin, self.zones = cut_mesh.points, origin, zones
         self.axisymmetric = case.axisymmetric
+        self._faces: dict[str, list[tuple[str, np.ndarray]]] = {}
+        self._nodes: dict[str, np.ndarray] = {}
+
+    def as_in(self, other: CutGroups) -> Self:
+        """These groups, with what `other` ones of the same mesh know: no node moves to another."""
+        self._faces, self._nodes = other._faces, other._nodes
+        return self
 
     def whole_cell_mask(self, group: str) -> dict[str, np.ndarray]:
         """Which volume cells (n,) of each type, as meshed, belong to a group."""
@@ -90,8 +97,10 @@ class CutGroups:
 
     def faces(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
         """The faces of a group, slave faces replaced by their sub-faces: (type, nodes)."""
-        blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
-        return [(block.type.name, block.nodes) for block in blocks]
+        if group not in self._faces:
+            blocks = self.as_cut(faces_of(self.mesh, group, self.case, key))
+            self._faces[group] = [(block.type.name, _kept(block.nodes)) for block in blocks]
+        return self._faces[group]
 
     def faces_with_area(self, group: str, key: str) -> list[tuple[str, np.ndarray]]:
         """The faces of a group that do not lie on the axis of revolution; refused without any."""
@@ -121,6 +130,11 @@ class CutGroups:
 
     def nodes(self, group: str, key: str) -> np.ndarray:
         """All nodes of a group: of its volume cells, faces, edges and points."""
+        if group not in self._nodes:
+            self._nodes[group] = _kept(self._nodes_of(group, key))
+        return self._nodes[group]
+
+    def _nodes_of(self, group: str, key: str) -> np.ndarray:
         dim = self.points.shape[1]
         if group == ALL:
             return np.arange(len(self.points))
@@ -173,6 +187,12 @@ class CutGroups:
         """The displacement (k, dim) of the case's exact solution at nodes (k,)."""
         place = self.points[nodes] + self.origin
         return self.exact.displacement(place, self.exact_part[nodes])
+
+
+def _kept(values: np.ndarray) -> np.ndarray:
+    """Values that all who ask get, and nobody changes."""
+    values.flags.writeable = False
+    return values
 
 
 def _part(block: FaceBlock, sub: SubFaces, number: np.ndarray) -> FaceBlock:

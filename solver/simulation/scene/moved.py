@@ -96,6 +96,7 @@ class Moved(Attributes):
         cut = replace(rest.cut, points=frames.placed(rest.points, rest.body))
         case = replace(rest.case, steps=(step,))
         super().__init__(case, rest.mesh, cut, rest.zones, rest.origin)
+        self.as_in(rest)
         self.rest, self.step, self.frames_of_bodies = rest, step, frames
         self.contact_faces, self._wanted = faces, wanted
 

@@ -5,6 +5,7 @@ All raise InputError for a point outside of what it is asked of, or in two bodie
 
 import numpy as np
 
+from ...lac.cells.shape import shape_functions
 from ...mechanics.fem.locate import Located, locate
 from ...system.errors import InputError
 from .scene import Scene
@@ -24,31 +25,31 @@ def places_of(scene: Scene, name: str) -> np.ndarray:
     )
 
 
-def cell_at(scene: Scene, name: str) -> Located:
-    """The cell that holds the point of a probe."""
+def cell_at(scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes (n,) of the cell that holds the point of a probe, and their shares (n,) in it."""
     probe, blocks = scene.case.probes[name], list(scene.mesh.cells.items())
     if probe.within:
         given = scene.given.groups[probe.within]
         blocks = [(kind, cells[scene.mesh.members(kind, given)]) for kind, cells in blocks]
-    found = locate(scene.points, blocks, places_of(scene, name)[0])
-    inside = [one for one in found if one.distance <= _NEAR * scene.coordinates.length]
-    if not inside:
-        allowed = f"no cell is there; the nearest is {found[0].distance:.3g} away"
+    found = locate(scene.points, blocks, places_of(scene, name))
+    inside = found[found.distance <= _NEAR * scene.coordinates.length]
+    if not len(inside.place):
+        allowed = f"no cell is there; the nearest is {found.distance[0]:.3g} away"
         raise _refusal(scene, name, allowed)
-    if len({scene.body[one.nodes[0]] for one in inside}) > 1:
+    cells = [blocks[b][1][n] for b, n in zip(inside.block, inside.number, strict=True)]
+    if len({scene.body[nodes[0]] for nodes in cells}) > 1:
         raise _refusal(scene, name, "bodies meet there; name the cells of one of them (within)")
-    return inside[0]
+    shape = shape_functions(blocks[inside.block[0]][0])
+    return cells[0], shape.values(inside.reference[:1])[0]
 
 
-def faces_at(scene: Scene, name: str, faces: list[tuple[str, np.ndarray]]) -> list[Located]:
-    """The slave faces, of those of its zone, that are nearest to each place of a probe."""
-    found = [locate(scene.points, faces, place)[0] for place in places_of(scene, name)]
-    away = next(
-        (f.distance for f in found if f.distance > _ON_SURFACE * scene.coordinates.length), None
-    )
-    if away is not None:
+def faces_at(scene: Scene, name: str, faces: list[tuple[str, np.ndarray]]) -> Located:
+    """The slave face, of those of its zone, that is nearest to each place of a probe."""
+    found = locate(scene.points, faces, places_of(scene, name)).nearest
+    away = found.distance[found.distance > _ON_SURFACE * scene.coordinates.length]
+    if len(away):
         zone = scene.case.probes[name].zone
-        raise _refusal(scene, name, f"is {away:.3g} from the slave surface of {zone}")
+        raise _refusal(scene, name, f"is {away[0]:.3g} from the slave surface of {zone}")
     return found
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -44,14 +45,16 @@ class Imposed(Holding):
     ) -> dict[str, Fixed]:
         """One for each component of each support."""
         found = {}
-        for key, support, fixed in self._each():
+        for key, support, fixed in self._each:
             mine = name is None or support == name
             found[key] = fixed if mine else replace(fixed, values=0 * fixed.values)
         return found
 
-    def _each(self) -> Iterator[tuple[str, str, Fixed]]:
+    @cached_property
+    def _each(self) -> list[tuple[str, str, Fixed]]:
         """Key, name of the support in steps, and what is fixed."""
         groups, points = self._groups, self._groups.points
+        found = []
         for i, support in enumerate(groups.case.supports):
             nodes = groups.nodes(support.group, f"supports[{i}].group")
             for direction, value in support.fix.items():
@@ -66,4 +69,6 @@ class Imposed(Holding):
                     values = np.einsum("nd,nd->n", whole, directions)
                 else:
                     values = groups.field(value)(points[nodes])
-                yield key, support.name, Fixed(nodes, directions, values, support.group)
+                fixed = Fixed(nodes, directions, values, support.group)
+                found.append((key, support.name, fixed))
+        return found
