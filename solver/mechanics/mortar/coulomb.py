@@ -123,8 +123,10 @@ class CoulombContact:
         size = scale if size < _NOTHING * scale else size
         start, rest = forces / size, np.zeros(len(forces)) + guess / size
         attempts = self._attempts(rest, start, None if last is None else last / size)
-        several = bool(self.friction.max(initial=0.0) > UNIQUE)
-        known = list(filter(None, islice(attempts, 1 + several)))
+        known = list(filter(None, islice(attempts, 1)))
+        # More than all of the contact cannot stay closed.
+        if self.friction.max(initial=0.0) > UNIQUE and not any(k[0].closed.all() for k in known):
+            known += filter(None, islice(attempts, 1))
         known = known or list(islice(filter(None, attempts), 1))
         if not known:
             return None
