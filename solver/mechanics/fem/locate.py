@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from ...lac.cells.catalogue import CellType, cell_type
 from ...lac.cells.shape import shape_functions
+from ...lac.pairing import candidate_pairs
 
 _STEPS = 30
 # The gradients of a pyramid's shape functions have no value at its apex.
@@ -76,17 +77,16 @@ def _in_block(
     """The cells of one type, of nodes (n, n_nodes, dim), near places; parts of these in turn."""
     low, high = corner.min(axis=1), corner.max(axis=1)
     across = np.linalg.norm(high - low, axis=1)
-    tree = cKDTree((low + high) / 2)
+    middle = (low + high) / 2
+    tree = cKDTree(middle)
     for start in range(0, len(places), _PART):
         part = places[start : start + _PART]
         # The box whose middle is nearest is no farther than that; a middle is half across away.
-        reach = tree.query(part)[0] + (0.5 + _NEAR) * across.max()
-        close = tree.query_ball_point(part, reach)
-        count = np.array([len(cells) for cells in close])
-        place, cell = np.repeat(np.arange(len(part)), count), np.concatenate(close)
+        limit, _ = tree.query(part)
+        place, cell = candidate_pairs(part, limit, middle, (0.5 + _NEAR) * across, 0.0)
         beyond = np.maximum(low[cell] - part[place], part[place] - high[cell])
         apart = np.linalg.norm(np.maximum(beyond, 0), axis=1)
-        least = np.minimum.reduceat(apart, np.cumsum(count) - count)
+        least = np.minimum.reduceat(apart, np.flatnonzero(np.diff(place, prepend=-1)))
         near = apart <= least[place] + _NEAR * across[cell]
         place, cell = place[near], cell[near]
         reference = _inverted(kind, corner[cell], part[place])

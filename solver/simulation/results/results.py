@@ -280,8 +280,8 @@ def _on_surface(scene: Scene, zone: ZoneResult, name: str, places: np.ndarray) -
     """The contact pressure where a zone's slave surface is nearest to local places (k, dim)."""
     pressure, points = np.empty(len(places)), scene.points + scene.coordinates.origin
     found = faces_at(scene, name, zone.faces_of("slave"))
-    for block, (kind, nodes, owner) in enumerate(zone.faces):
-        here = found.block == block
+    for block in np.unique(found.block):
+        (kind, nodes, owner), here = zone.faces[block], found.block == block
         face, reference = found.number[here], found.reference[here][:, None]
         at = pressure_on(points, zone, kind, nodes[face], owner[face], reference)
         pressure[here] = at[:, 0]

@@ -77,7 +77,7 @@ class CutGroups:
         self._nodes: dict[str, np.ndarray] = {}
 
     def as_in(self, other: CutGroups) -> Self:
-        """These groups, with what `other` ones of the same mesh know: no node moves to another."""
+        """With the nodes and faces found in `other` groups of the mesh, wherever bodies move."""
         self._faces, self._nodes = other._faces, other._nodes
         return self
 
