@@ -176,7 +176,7 @@ contact:
     interference: 0.0                    # initial overlap of bodies that are modelled without it
     recovery: none                       # of a pressure of higher order from constants: none,
                                          # linear, quadratic, smooth, or automatic by the cells
-    # sweeps: 24                         # solves with its loads: more bring it nearer to its limit
+    # sweeps: 24                         # at most so many solves with its loads, until it settles
     stabilised: false                    # true: contact gives way to pressures that scatter
 #   clearance: 0.0                       # the initial gap, a number or an expression; replaces
                                          # the gap between the meshed faces

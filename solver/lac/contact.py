@@ -30,7 +30,7 @@ from .facets import Facets, facets, with_master_normals, with_nodal_normals
 from .meshes import Names, cut_mesh, read_faces, unknowns_at_nodes
 from .operator import MIN_COVERAGE, gap_operator
 from .reconstruction import Reconstruction, form_of
-from .recovery import Recovery, RecoveryRequest, grows, with_status
+from .recovery import Recovery, RecoveryRequest, unsettled, with_status
 from .roughness import Smooth, smoothed
 from .saddle_point import SaddlePoint, numbered
 from .status import Trial, find_status
@@ -93,13 +93,12 @@ class RecoveredState:
 
 
 class _UnderRecovery(NamedTuple):
-    """A system under a recovered pressure, whose `fit` to the `means` (k,) of facets it is."""
+    """A system under a recovered pressure, whose `fit` to the means of facets it is."""
 
     system: SaddlePoint
     trial: Trial
     closed: np.ndarray
     fit: Reconstruction
-    means: np.ndarray
 
 
 class LocalAverageContact:
@@ -307,11 +306,12 @@ class LocalAverageContact:
 
         def correct(closed: np.ndarray) -> _UnderRecovery | None:
             fit = recovery.reconstruction(closed)
-            means, first = system.settled(closed, added @ fit.matrix, shape.sweeps)
+            means, first = system.settled(closed, added @ fit.matrix)
             under = system.under(added @ (fit.matrix @ means))
             trial = under.trial(closed)
-            diverged = grows(first, trial.pressure - means, trial)
-            return None if diverged else _UnderRecovery(under, trial, closed, fit, means)
+            if unsettled(first, trial.pressure - means, trial):
+                return None
+            return _UnderRecovery(under, trial, closed, fit)
 
         def wrong(found: _UnderRecovery) -> bool:
             return bool((self._opposed & (found.trial.violation(found.closed) > 1)).any())
@@ -325,8 +325,7 @@ class LocalAverageContact:
         if settled is None:
             raise SolveError("status or pressure do not settle under the recovered pressure")
         found = _state(settled.system, settled.trial, settled.closed, state.iterations)
-        applied = shape.degree == 2 and shape.keeps_means
-        coefficients = settled.fit.matrix @ (settled.means if applied else found.pressure)
+        coefficients = settled.fit.matrix @ found.pressure
         error = recovery.error(coefficients, settled.fit)
         return RecoveredState(found, error, recovery, coefficients)
 

@@ -41,10 +41,10 @@ _AT_ONCE = 4096
 
 @dataclass(frozen=True)
 class Form:
-    """A kind of reconstruction: its degree, whether it keeps the means, how often it is applied.
+    """A kind of reconstruction: its degree, whether it keeps the means, whether it is applied.
 
-    `sweeps`: solves with the loads that it adds. The form `none` estimates the error of the
-    constants and recovers nothing. `rings`: the fewest rings of neighbours in 2D and in 3D.
+    The form `none` estimates the error of the constants, and is not. `rings`: the fewest rings of
+    neighbours in 2D and in 3D.
     `reach`: neighbours at a distance r have the weight exp(−(r / (reach · farthest))²) where the
     means are not kept, else 1 / r. `fitted`: the degree that is fitted, where it is a lower one.
     """
@@ -52,7 +52,7 @@ class Form:
     name: str
     degree: int
     keeps_means: bool
-    sweeps: int
+    applied: bool = True
     rings: tuple[int, int] = (1, 1)
     reach: float = 1.0
     fitted: int = 2
@@ -71,17 +71,17 @@ class Form:
 FORMS = {
     form.name: form
     for form in (
-        Form("none", degree=1, keeps_means=False, sweeps=0),
-        Form("linear", degree=1, keeps_means=True, sweeps=2),
-        Form("quadratic", degree=2, keeps_means=True, sweeps=3, rings=(1, 2)),
-        Form("smooth", degree=2, keeps_means=False, sweeps=3, rings=(2, 2), reach=0.7),
+        Form("none", degree=1, keeps_means=False, applied=False),
+        Form("linear", degree=1, keeps_means=True),
+        Form("quadratic", degree=2, keeps_means=True, rings=(1, 2)),
+        Form("smooth", degree=2, keeps_means=False, rings=(2, 2), reach=0.7),
     )
 }
 # The means of linear cells, by the vertices of their faces: on lines and triangles they scatter
 # more than those of quadratic cells. On quadrilaterals they are too large where the pressure is
 # highest, and a linear fit, which lowers them there, is the better one.
-_WIDE = replace(FORMS["smooth"], sweeps=2, rings=(3, 3), reach=1.0)
-_NEAR = replace(FORMS["smooth"], sweeps=2, rings=(1, 1), reach=1.25, fitted=1)
+_WIDE = replace(FORMS["smooth"], rings=(3, 3), reach=1.0)
+_NEAR = replace(FORMS["smooth"], rings=(1, 1), reach=1.25, fitted=1)
 _ON_LINEAR_CELLS = {2: _WIDE, 3: _WIDE, 4: _NEAR}
 
 

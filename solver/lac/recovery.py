@@ -5,9 +5,10 @@ constants withhold from them: the loads Fᵀ c with Fᵢₖ = ∫ ψᵢₖ (N_ma
 are applied have mean zero on their macro-element: the constants stay the means.
 
 What constants withhold is known as soon as the means p are. It is given to the bodies as a load,
-which changes p, and so on: p ↦ p + ω (pₖ − p), ω = 0.87. The map is affine and contracts by 0.1–0.4
-a sweep, whatever the mesh, the materials and Poisson's ratio (docs/recovery.md). From the second
-sweep on the combination of the last two is taken that leaves least of pₖ − p.
+which changes p, and so on: p ↦ p + ω (pₖ − p), ω = 0.87, until p stays as it is. The map is affine
+and contracts by 0.1–0.4 a sweep, whatever the mesh, the materials and Poisson's ratio
+(docs/recovery.md). From the second sweep on the combination of all of them is taken that leaves
+least of pₖ − p.
 
 Source: Stetter, Numer. Math. 29 (1978) 425–443, for the deferred correction that applies them;
 D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
@@ -30,9 +31,17 @@ from .status import Trial
 
 # The eigenvalues of a sweep lie between −0.55 and 0: this makes them 0.34 at most.
 _RELAXATION = 0.87
+# So many sweeps at most, unless it is said how many, and the change of a mean, as a share of the
+# largest, that ends them.
+MOST_SWEEPS, SETTLED = 40, 1e-11
+# A last change of more than this share of the largest mean is no end.
+_UNSETTLED = 1e-6
 # Sweeps diverge where one changes so many times what the first did, and more than this share of the
-# pressure, which is rounding.
+# pressure, which is rounding: where a body is all but free to turn, a reconstruction from rounded
+# pressures turns it.
 _GROWTH, _ROUNDING = 10, 1e-9
+# Sweeps that change nearly the same are combined as one.
+_ALIKE = 1e-8
 # How often a status that the recovered pressure changes is found anew.
 _ROUNDS = 3
 S = TypeVar("S")
@@ -155,7 +164,7 @@ def recovery(
         psi = at.local.shapes(segments.macro, segments.points, form)
         weighted = segments.weight[..., None] * psi
         np.add.at(products, segments.macro, np.einsum("sqk,sql->skl", weighted, psi))
-        if form.sweeps:  # constants are not applied
+        if form.applied:
             given.append((segments, psi[..., : k - (not form.keeps_means)]))
     near = _same_materials(asked, found)
     along = tangents(surface.normal) if slip else []
@@ -241,12 +250,12 @@ def with_status(
 def settled_means(
     pressure: np.ndarray,
     force: np.ndarray,
-    sweeps: int,
     loads: Callable[[np.ndarray], np.ndarray],
     change: Callable[[np.ndarray], np.ndarray],
-    enough: float = 0.0,
+    most: int = MOST_SWEEPS,
+    enough: float = SETTLED,
 ) -> tuple[np.ndarray, float]:
-    """The means (k,) whose reconstruction is applied in the last of the `sweeps`.
+    """The means (k,) whose reconstruction is applied in the last sweep, of `most` of them.
 
     Also the largest change of a mean by the first sweep: a last one that changes more has diverged;
     infinite where there is no other.
@@ -254,45 +263,51 @@ def settled_means(
     `pressure` (k,) is the one under the loads `force` (n_dofs,) of a reconstruction; `loads` gives
     those of the reconstruction of any means, `change` by how much (k,) loads change the pressure.
     A sweep after the first that changes them by no more than the share `enough` of the largest is
-    the last one. The first alone does not tell whether changes grow.
+    the last one, and one that changes them far more than the first did.
 
     Here loads that are the means, and lower them by a third of their own, leave 3/4 of them:
 
-    >>> found, first = settled_means(np.ones(1), np.zeros(1), 3, lambda p: p, lambda f: -f / 3)
+    >>> found, first = settled_means(np.ones(1), np.zeros(1), lambda p: p, lambda f: -f / 3)
     >>> found.round(12).tolist(), round(first, 12)
     ([0.75], 0.333333333333)
     """
-    last, left, moved, first = pressure, pressure, pressure, np.inf
-    for sweep in range(sweeps - 1):
+    last, first = pressure, np.inf
+    tried: list[np.ndarray] = []
+    changes: list[np.ndarray] = []
+    for sweep in range(most - 1):
         following = loads(pressure)
         last = last + change(following - force)
-        before, left = left, last - pressure
-        largest = float(np.abs(left).max(initial=0.0))
+        left = last - pressure
+        largest, size = (float(np.abs(p).max(initial=0.0)) for p in (left, pressure))
         first = first if sweep else largest
-        if sweep and largest <= enough * np.abs(pressure).max(initial=0.0):
+        if sweep and (largest <= enough * size or largest > max(_GROWTH * first, _ROUNDING * size)):
             break
         step = _RELAXATION * left
         if sweep:
-            fell = left - before
-            share = np.linalg.lstsq(fell[:, None], left, rcond=None)[0]
-            step -= share * (moved + _RELAXATION * fell)
-        pressure, moved, force = pressure + step, step, following
+            moved = pressure[:, None] - np.transpose(tried)
+            fell = left[:, None] - np.transpose(changes)
+            share = np.linalg.lstsq(fell, left, rcond=_ALIKE)[0]
+            step -= (moved + _RELAXATION * fell) @ share
+        tried.append(pressure)
+        changes.append(left)
+        pressure, force = pressure + step, following
     return pressure, first
 
 
-def grows(first: float, change: np.ndarray, found: Trial) -> bool:
-    """Whether a sweep changed pressures by a `change` (k,) far above the `first`, and rounding.
+def unsettled(first: float, change: np.ndarray, found: Trial, most: int = MOST_SWEEPS) -> bool:
+    """Whether a `change` (k,) of pressures by the last of `most` sweeps leaves no recovered state.
 
-    Where a body is all but free to turn, a reconstruction from rounded pressures turns it, and the
-    sweeps diverge. `found` is what the sweep led to.
+    They diverge, or they do not settle, which is not asked of fewer than usual. `first`: the
+    largest change by the first sweep; `found`: what the last one led to.
 
     >>> none = np.zeros(1)
     >>> found = Trial(pressure=np.ones(1), gap=none, pressure_limit=none, gap_limit=none)
-    >>> [grows(first, np.full(1, 1e-3), found) for first in (1e-5, 1e-3)]
-    [True, False]
+    >>> [unsettled(1e-3, np.full(1, 1e-4), found, most) for most in (3, MOST_SWEEPS)]
+    [False, True]
     """
     size = float(np.abs(change).max(initial=0.0))
-    return size > max(_GROWTH * first, negligible(found, _ROUNDING))
+    grows = size > max(_GROWTH * first, negligible(found, _ROUNDING))
+    return grows or (most == MOST_SWEEPS and size > negligible(found, _UNSETTLED))
 
 
 def negligible(found: Trial, share: float) -> float:

@@ -72,16 +72,14 @@ class SaddlePoint:
         other.load = self.load + force[self.free]
         return other
 
-    def settled(
-        self, closed: np.ndarray, loads: csr_matrix, sweeps: int
-    ) -> tuple[np.ndarray, float]:
+    def settled(self, closed: np.ndarray, loads: csr_matrix) -> tuple[np.ndarray, float]:
         """See `settled_means`; `loads` (N, k): forces that a pressure of one adds."""
         before = self.trial(closed).pressure
 
         def change(force: np.ndarray) -> np.ndarray:
             return np.asarray(self.under(force).trial(closed).pressure - before)
 
-        return settled_means(before, np.zeros(len(self.force)), sweeps, loads.dot, change)
+        return settled_means(before, np.zeros(len(self.force)), loads.dot, change)
 
     def _factor(self, closed: np.ndarray) -> tuple[Any, csc_matrix]:
         key = closed.tobytes()

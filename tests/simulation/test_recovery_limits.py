@@ -38,9 +38,9 @@ def pressed(n: int, m: int, form: str, bottom: str = "QUAD8", top: str = "TRIA6"
 @pytest.mark.parametrize(
     ("pressure", "gap", "form", "settles"),
     [
-        ("5.34*(1 - 0.689*x/50)", "0.1*sin(x/9)", "smooth", True),
+        ("5.34*(1 - 0.689*x/50)", "0.1*sin(x/9)", "smooth", False),
         ("9.38*(1 + 0.116*x/50)", "0.1*sin(x/5)", "quadratic", True),
-        ("3.45*(1 + 0.739*x/50)", "0.1*sin(x/15)", "linear", False),
+        ("3.45*(1 + 0.739*x/50)", "0.1*sin(x/15)", "linear", True),
     ],
 )
 def test_the_status_is_that_under_the_recovered_pressure(pressure, gap, form, settles):
@@ -197,7 +197,7 @@ def test_a_body_that_is_all_but_free_to_turn_keeps_its_constants():
 
 
 def test_each_zone_has_its_own_form():
-    """Two pairs of blocks: a zone is as where both have its form, but for the sweeps."""
+    """Two pairs of blocks: a zone is as where both have its form."""
     mesh = block_mesh("QUAD8", "TRIA6", (6, 5))
     both = side_by_side(mesh, mesh)
     load = "pressure: '25*(1 + 0.2*cos(pi*x))'"
@@ -213,7 +213,7 @@ def test_each_zone_has_its_own_form():
     alone = {form: pressures((form, form)) for form in ("none", "linear", "quadratic", "smooth")}
     for forms in (("quadratic", "none"), ("linear", "quadratic")):
         for number, pressure in enumerate(pressures(forms)):
-            assert pressure == pytest.approx(alone[forms[number]][number], rel=1e-3)
+            assert pressure == pytest.approx(alone[forms[number]][number], rel=1e-9)
     assert not np.allclose(alone["none"][0], alone["linear"][0], rtol=1e-4)
 
 

@@ -69,6 +69,12 @@ def drawn(seed: int) -> Case:
     return case
 
 
+def planes(case: Case) -> list[Case]:
+    """The planes of its groups and rigid bodies."""
+    places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]
+    return [place["plane"] for place in places if "plane" in place]
+
+
 def _mesh(r: Random, dim: int) -> Case:
     recipe = r.choice(RECIPES[dim])
     mesh = {"recipe": recipe, "bottom": _body(r, dim), "top": _body(r, dim)}

@@ -8,13 +8,16 @@ from random import Random
 from types import FrameType
 from typing import Any, NamedTuple
 
+import meshio
 import numpy as np
 
 from solver import Solved, solve_case
 from solver.lac.errors import SolveError
+from solver.simulation.results.solution import ZoneResult
 from solver.system.errors import InputError
 
-from .cases import Case
+from .beside import OTHER, beside, others
+from .cases import Case, planes
 
 # Stresses in other units are so many times as large, lengths too.
 UNITS, LENGTHS = 1e6, 1e-3
@@ -26,6 +29,8 @@ LEAST = 1e-9
 # A solve takes less than a second.
 MOST_SECONDS = 60
 NOTHING = np.zeros(0)
+# The words of a case that was solved, the best first.
+_ANSWERS = "solved", "unreliable"
 
 
 class Seen(NamedTuple):
@@ -65,14 +70,9 @@ def elsewhere(case: Case) -> Case:
     if not along and not around:
         moves["rotate"] = angle if dim == 2 else {"axis": axis, "angle": angle}
     moves["translate"] = by = [r.uniform(-2.0, 2.0) * (k > 0 or not around) for k in range(dim)]
-    for plane in _planes(found):
+    for plane in planes(found):
         plane["point"] = [x + d for x, d in zip(plane["point"], by, strict=True)]
     return found
-
-
-def _planes(case: Case) -> list[Case]:
-    places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]
-    return [place["plane"] for place in places if "plane" in place]
 
 
 def in_another_order(case: Case) -> Case:
@@ -105,12 +105,21 @@ def _in_units(value: Any, units: dict[str, float], unit: float = 1.0) -> Any:
     return value if unit == 1.0 or isinstance(value, str) else unit * value
 
 
-def seen(case: Case, everything: bool = False, unit: float = 1.0, length: float = 1.0) -> Seen:
-    """Solve a case; only a traceback is no answer, or no end in a minute."""
+def seen(
+    case: Case,
+    everything: bool = False,
+    unit: float = 1.0,
+    length: float = 1.0,
+    mesh: meshio.Mesh | None = None,
+) -> Seen:
+    """Solve a case; only a traceback is no answer, or no end in a minute.
+
+    What stands beside it is not looked at.
+    """
     before = signal.signal(signal.SIGALRM, _too_long)
     signal.alarm(MOST_SECONDS)
     try:
-        solved = solve_case(case, everything=everything)
+        solved = solve_case(case, mesh, everything=everything)
     except InputError as error:
         return Seen("refused", str(error))
     except SolveError as error:
@@ -119,7 +128,7 @@ def seen(case: Case, everything: bool = False, unit: float = 1.0, length: float 
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
     causes = solved.solution.quality.accuracy.values()
-    values = solved.pressure / unit, _tractions(solved) / unit, _moved(solved) / length
+    values = _pressures(solved) / unit, _tractions(solved) / unit, _moved(solved) / length
     size = max(solved.solution.largest_pressure / unit, np.finfo(float).tiny)
     return Seen(solved.verdict, solved.reason, *values, size, max(causes, default=0.0))
 
@@ -128,13 +137,21 @@ def _too_long(_: int, __: FrameType | None) -> None:
     raise TimeoutError(f"no end after {MOST_SECONDS} s")
 
 
+def _own_zones(solved: Solved) -> list[ZoneResult]:
+    return [zone for zone in solved.solution.zones if not zone.name.startswith(OTHER)]
+
+
+def _pressures(solved: Solved) -> np.ndarray:
+    return np.concatenate([NOTHING, *(zone.multiplier for zone in _own_zones(solved))])
+
+
 def _tractions(solved: Solved) -> np.ndarray:
     """The sizes (m,) of the tractions of friction on all macro-elements."""
-    zones = solved.solution.zones
     found = (
-        z.friction.friction_traction if z.friction else np.zeros((len(z.area), 1)) for z in zones
+        z.friction.friction_traction if z.friction else np.zeros((len(z.area), 1))
+        for z in _own_zones(solved)
     )
-    return np.concatenate([np.zeros(0), *(np.linalg.norm(each, axis=1) for each in found)])
+    return np.concatenate([NOTHING, *(np.linalg.norm(each, axis=1) for each in found)])
 
 
 def _moved(solved: Solved) -> np.ndarray:
@@ -159,6 +176,23 @@ def _differences(case: Case, first: Seen) -> Iterator[str]:
         unit, length = (UNITS, LENGTHS) if name == "other units" else (1.0, 1.0)
         again = seen(other, everything, unit, length)
         yield from (f"{name}: {what}" for what in _between(first, again, name))
+    if first.word in _ANSWERS:
+        yield from (f"beside: {what}" for what in _between(first, _beside(case, first), "beside"))
+
+
+def _beside(case: Case, first: Seen) -> Seen:
+    """What comes of a case with another one beside it, in which something presses everywhere.
+
+    Its word where the other one has a worse one.
+    """
+    other = others(case)
+    alone = seen(other)
+    if alone.word not in _ANSWERS or not alone.moved.size:
+        return first
+    joined, mesh = beside(case, other)
+    both = seen(joined, mesh=mesh)
+    worst = max(first.word, alone.word, key=_ANSWERS.index)
+    return both._replace(moved=NOTHING, word=first.word if both.word == worst else both.word)
 
 
 def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:

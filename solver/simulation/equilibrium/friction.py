@@ -16,8 +16,8 @@ import numpy as np
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult
-from ...mechanics.mortar.coulomb import CoulombContact
 from .accuracy import AT_REST, forces_at_work
+from .contacts import Contacts
 from .problem import ContactProblem
 from .state import Equilibrium, Friction
 
@@ -77,8 +77,17 @@ class Search:
         last = None if self.last is None else area * self.last[base.eligible]
         pressure, at_work = self._where_nothing_moves(correction)
         at_rest = area * pressure[base.eligible]
-        solution = contact.solve(at_rest, gone, last, at_work)
-        if solution is None or self._is_nothing(solution[0], at_work):
+
+        def presses(forces: np.ndarray) -> bool:
+            return bool(forces.max(initial=0.0) > AT_REST * at_work)
+
+        def rest(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            unpressed = self._unpressed(gaps, at_work, correction)
+            jump = (unpressed.gap - self.jump)[base.eligible]
+            return unpressed.status.closed[base.eligible][: contact.m], jump
+
+        solution = contact.solve(at_rest, gone, last, at_work, presses, rest)
+        if solution is None:
             return self._resting(at_work, correction)
         forces, z, steps = solution
         _LOG.info("friction: %d Newton steps", steps)
@@ -108,12 +117,10 @@ class Search:
         change = self.problem.pressure_change(self.problem.constraints.eligible, more)
         return known.pressure + change, known.at_work
 
-    def _is_nothing(self, forces: np.ndarray, at_work: float) -> bool:
-        """Whether nothing presses."""
-        return bool(forces[: self._contact.m].max(initial=0.0) <= AT_REST * at_work)
-
-    def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
-        """Equilibrium in which nothing presses, so that nothing rubs.
+    def _unpressed(
+        self, gaps: np.ndarray, at_work: float, correction: np.ndarray | float
+    ) -> Equilibrium:
+        """Equilibrium without friction in which nothing presses some `gaps` (m,).
 
         A body that its loads have left may be in many places: this one touches another body. Raises
         SolveError if the search without friction finds no such state.
@@ -124,8 +131,14 @@ class Search:
         except SolveError:
             raise SolveError(self._why_none()) from None
         pressed = base.covered * np.maximum(found.pressure - found.trial.pressure_limit, 0.0)
-        if not self._is_nothing(pressed[base.eligible], at_work):
+        if (pressed[base.eligible][: len(gaps)][gaps] > AT_REST * at_work).any():
             raise SolveError(self._why_none())
+        return found
+
+    def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
+        """Equilibrium in which nothing presses, so that nothing rubs."""
+        base, everywhere = self.problem.constraints, np.ones(self._contact.m, dtype=bool)
+        found = self._unpressed(everywhere, at_work, correction)
         none = np.zeros_like(found.pressure)
         trial = replace(found.trial, pressure=none, gap=found.gap - self.jump)
         closed = found.status.closed[base.eligible][: self._contact.m]
@@ -183,13 +196,18 @@ class Search:
         return found
 
     @cached_property
-    def _contact(self) -> CoulombContact:
-        """The contact alone, of the rows that may close or stick."""
+    def _contact(self) -> Contacts:
+        """The contacts alone, of the rows that may close or stick."""
         rows = self.problem.constraints.eligible
         number, there = np.cumsum(rows) - 1, rows[self.gaps]
         friction, of = self.coefficient[there], number[self.gaps[there]]
         stiffness, diagonal = self.problem.contact_stiffness()
-        return CoulombContact(stiffness, diagonal, friction, of, number[self.rows[:, there]])
+        slips = number[self.rows[:, there]]
+        group = np.zeros(len(rows), dtype=int)
+        for joined, part in enumerate(self.problem.parts):
+            group[part.multipliers] = joined
+        gaps = group[rows][: len(diagonal) - slips.size]
+        return Contacts(stiffness, diagonal, friction, of, slips, gaps)
 
     def _why_none(self) -> str:
         """Why Newton's method found no state: a body that friction would have to hold, if any."""

@@ -18,18 +18,14 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.friction import of_tractions
-from ...lac.recovery import Recovery, grows, negligible, settled_means
+from ...lac.recovery import Recovery, settled_means, unsettled
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, with_estimate
+from .recovery import ZoneFit, fit_of, most_sweeps, with_estimate
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
-# So many sweeps at most, unless the case says how many, and the change of a mean, as a share of the
-# largest, that ends them: slips have a memory, so that what is left would add up over steps. A last
-# change of more than `_UNSETTLED` is no end: a macro-element sticks and slips in turn.
-_MOST_SWEEPS, _SETTLED, _UNSETTLED = 40, 1e-10, 1e-6
 # Axes of macro-elements that differ by less, as a share of them, are the same.
 _TURNED = 1e-9
 
@@ -110,15 +106,13 @@ def solve_and_recover(
     search, zones = Search(problem, step, before), problem.scene.zones
     given = [(zone, zone.operator.recovery) for zone in zones if zone.operator.recovery]
     recovering = [zone for zone, _ in given]
-    sweeps, enough = max((recovery.form.sweeps for _, recovery in given), default=0), 0.0
-    if not sweeps:
+    most = most_sweeps(recovering)
+    if not most:
         return with_estimate(recovering, search.settled())
-    if not any(zone.zone.sweeps for zone in zones):
-        sweeps, enough = _MOST_SWEEPS, _SETTLED
     for start in _starts(given, before):
         sweeping = _Sweeping(search, recovering, start)
         try:
-            return sweeping.settled(sweeps, enough)
+            return sweeping.settled(most)
         except SolveError:
             continue
     state = search.settled()
@@ -156,32 +150,28 @@ class _Sweeping:
         self.shape = search.problem.scene.points.shape
         self.force = np.zeros(np.prod(self.shape)) if before is None else before.correction.ravel()
         self.state: Equilibrium
-        self.first: float | None = None
 
-    def settled(self, sweeps: int, enough: float) -> Equilibrium:
-        """The state with its recovered pressure; SolveError where the sweeps do not settle.
-
-        `enough`: see `settled_means`.
-        """
+    def settled(self, most: int) -> Equilibrium:
+        """The state with its recovered pressure; SolveError where `most` sweeps do not settle."""
         self.state = self._under(self.force)
         if not self.state.status.closed.any():
             if self.before:
                 raise SolveError("what pressed in the last step is open")
             return self.state
         start = self.state.pressure, self.force
-        values, _ = settled_means(*start, sweeps, self._added, self._change, enough)
+        values, first = settled_means(*start, self._added, self._change, most)
         loads = [_Loads.of(zone, self.state, self.before) for zone in self.zones]
         forces = [each.force(values) for each in loads]
         couples = (each.couple(values) for each in loads)
         found = self._under(np.sum(forces, axis=0))
-        left = found.pressure - values
-        self._refuse_growth(left, found)
-        if enough and np.abs(left).max(initial=0.0) > negligible(found.trial, _UNSETTLED):
+        if unsettled(first, found.pressure - values, found.trial, most):
             raise SolveError("the sweeps do not settle")
         fields = {}
         for each, force in zip(loads, forces, strict=True):
-            read = each.fit.read(found.pressure, each.fit.coefficients(values))
-            fields[each.zone.zone.name] = each.fit.field(read, force, each.tractions(values))
+            coefficients = each.fit.coefficients(found.pressure)
+            fields[each.zone.zone.name] = each.fit.field(
+                coefficients, force, each.tractions(values)
+            )
         return replace(found, couple=sum(couples, np.zeros(3)), fields=fields)
 
     def _under(self, force: np.ndarray, on_the_way: bool = False) -> Equilibrium:
@@ -196,13 +186,4 @@ class _Sweeping:
         """By how much (k,) further forces (n_dofs,) change pressures and tractions."""
         self.force = self.force + force
         last, self.state = self.state, self._under(self.force, on_the_way=True)
-        found = self.state.pressure - last.pressure
-        self._refuse_growth(found, self.state)
-        return found
-
-    def _refuse_growth(self, change: np.ndarray, state: Equilibrium) -> None:
-        """SolveError where a sweep changed far more than the first one."""
-        if self.first is None:
-            self.first = float(np.abs(change).max(initial=0.0))
-        if grows(self.first, change, state.trial):
-            raise SolveError("the sweeps diverge")
+        return self.state.pressure - last.pressure

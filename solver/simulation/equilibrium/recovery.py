@@ -13,12 +13,22 @@ import numpy as np
 
 from ...case.acting import Step
 from ...lac.reconstruction import Reconstruction
-from ...lac.recovery import Recovery, grows, settled_means, with_status
+from ...lac.recovery import (
+    MOST_SWEEPS,
+    SETTLED,
+    Recovery,
+    settled_means,
+    unsettled,
+    with_status,
+)
 from ..scene.scene import ZoneScene
 from .problem import ContactProblem
 from .state import Equilibrium, PressureField
 
 _LOG = logging.getLogger(__name__)
+# What ends the sweeps where each is a solve by iterations, which costs more and is less exact. If
+# the last one, in full, changes more, they begin again from there.
+_BY_ITERATIONS = 1e-6, 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,15 +42,6 @@ class ZoneFit:
     def coefficients(self, pressure: np.ndarray) -> np.ndarray:
         """C (m · k,) of the pressures (k,) of all multipliers."""
         return np.asarray(self.reconstruction.matrix @ pressure[self.numbers])
-
-    def read(self, pressure: np.ndarray, applied: np.ndarray) -> np.ndarray:
-        """C (m · k,) as read: of a quadratic the one applied, else by the last pressures.
-
-        Three sweeps settle what is applied; after two the last pressures are a sweep ahead of it.
-        """
-        form = self.recovery.form
-        quadratic = form.degree == 2 and form.keeps_means
-        return applied if quadratic else self.coefficients(pressure)
 
     def field(
         self, coefficients: np.ndarray, force: np.ndarray, tractions: Sequence[np.ndarray] = ()
@@ -58,11 +59,10 @@ class ZoneFit:
 
 
 class _Corrected(NamedTuple):
-    """A state under its reconstruction; by zone its fit, coefficients, and loads (n_dofs,)."""
+    """A state under its reconstruction; by zone its fit, and its loads (n_dofs,)."""
 
     state: Equilibrium
     zones: list[ZoneFit]
-    read: list[np.ndarray]
     forces: list[np.ndarray]
 
 
@@ -73,12 +73,13 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     is recovered, but the error of the constants is estimated.
     """
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
-    applied = any((asked := zone.operator.recovery) and asked.form.sweeps for zone in given)
-    if not applied or not state.status.closed.any():
+    most = most_sweeps(given)
+    if not most or not state.status.closed.any():
         return with_estimate(given, state)
 
     def correct(state: Equilibrium) -> _Corrected | None:
-        return _corrected(problem, state, [fit_of(zone, state.status.closed) for zone in given])
+        fits = [fit_of(zone, state.status.closed) for zone in given]
+        return _corrected(problem, state, fits, most)
 
     def wrong(found: _Corrected) -> bool:
         violation = found.state.trial.violation(found.state.status.closed)
@@ -93,12 +94,18 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
         _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
         return with_estimate(given, state)
     fields = {
-        zone.zone.name: fit.field(coefficients, force)
-        for zone, fit, coefficients, force in zip(
-            given, found.zones, found.read, found.forces, strict=True
-        )
+        zone.zone.name: fit.field(fit.coefficients(found.state.pressure), force)
+        for zone, fit, force in zip(given, found.zones, found.forces, strict=True)
     }
     return replace(found.state, fields=fields)
+
+
+def most_sweeps(zones: Sequence[ZoneScene]) -> int:
+    """The most sweeps for zones with a recovery, as their case says; 0 where none is applied."""
+    asked = ((zone.operator.recovery, zone.zone.sweeps) for zone in zones)
+    return max(
+        (n or MOST_SWEEPS for recovery, n in asked if recovery and recovery.form.applied), default=0
+    )
 
 
 def with_estimate(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium:
@@ -120,26 +127,25 @@ def fit_of(zone: ZoneScene, closed: np.ndarray) -> ZoneFit:
 
 
 def _corrected(
-    problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit]
+    problem: ContactProblem, state: Equilibrium, zones: list[ZoneFit], most: int
 ) -> _Corrected | None:
-    """The state with the loads of its reconstruction; None where the sweeps diverge."""
-    sweeps = max(zone.recovery.form.sweeps for zone in zones)
+    """The state with the loads of its reconstruction; None where `most` sweeps do not settle."""
+    closed, shape = state.status.closed, state.correction.shape
+    enough, tries = _BY_ITERATIONS if problem.linear_iterations else (SETTLED, 1)
 
     def loads(pressure: np.ndarray) -> list[np.ndarray]:
         return [z.recovery.loads.T @ z.coefficients(pressure) for z in zones]
 
-    pressure, first = settled_means(
-        state.pressure,
-        state.correction.ravel(),
-        sweeps,
-        lambda pressure: sum(loads(pressure), np.zeros(state.correction.size)),
-        lambda force: problem.pressure_change(state.status.closed, force),
-    )
-    applied = [zone.coefficients(pressure) for zone in zones]
-    added = [z.recovery.loads.T @ c for z, c in zip(zones, applied, strict=True)]
-    correction = np.sum(added, axis=0).reshape(state.correction.shape)
-    state = problem.corrected(state, correction)
-    if grows(first, state.pressure - pressure, state.trial):
-        return None
-    read = [z.read(state.pressure, c) for z, c in zip(zones, applied, strict=True)]
-    return _Corrected(state, zones, read, added)
+    def added(pressure: np.ndarray) -> np.ndarray:
+        return np.asarray(sum(loads(pressure)))
+
+    def change(force: np.ndarray) -> np.ndarray:
+        return problem.pressure_change(closed, force)
+
+    for _ in range(tries):
+        start = state.pressure, state.correction.ravel()
+        pressure, first = settled_means(*start, added, change, most, enough)
+        state = problem.corrected(state, added(pressure).reshape(shape))
+        if not unsettled(first, state.pressure - pressure, state.trial, most):
+            return _Corrected(state, zones, loads(pressure))
+    return None

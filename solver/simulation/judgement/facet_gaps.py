@@ -56,14 +56,12 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     """What facets do to a state, its status kept.
 
     Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
-    nodes. A pressure below its round-off limit counts as zero. The elastic closing is twice the
-    strain energy over ∫ p, the largest it can be.
+    nodes. A pressure below its round-off limit counts as zero.
     """
     scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
     presses = state.pressure > state.trial.pressure_limit
     pushed = np.where(presses, state.pressure, 0.0) * problem.constraints.covered
-    force = float(pushed[: scene.n_multipliers].sum())
-    closing = 2 * strain_energy(state) / force if force > 0 else 0.0
+    closing = _closing(problem, state, pushed)
     for zone in scene.zones:
         mine, missed = zone.numbers, _missed(scene, zone)
         if missed is None:
@@ -75,8 +73,8 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
                 depth = max(depth, peak / float(left.min(initial=np.inf)))
             continue
         gaps[mine] = missed.gap
-        if closing > 0:
-            depth = max(depth, float(pushed[mine] @ missed.depth / pushed[mine].sum() / closing))
+        if (closed_by := float(pushed[mine] @ closing[mine])) > 0:
+            depth = max(depth, float(pushed[mine] @ missed.depth) / closed_by)
     closed = state.iterate.closed & problem.constraints.normal
     if not gaps[closed].any():
         return FacetEffect(0.0, depth)
@@ -87,6 +85,23 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
         if gaps[mine].any():
             shares.append(float(np.sqrt(weight @ change[mine] ** 2 / size)))
     return FacetEffect(max(shares), depth)
+
+
+def _closing(problem: ContactProblem, state: Equilibrium, pushed: np.ndarray) -> np.ndarray:
+    """By how much (k,) contact closes elastically where forces `pushed` (k,) act.
+
+    Twice the strain energy over ∫ p, the largest it can be, of the bodies that contact joins: what
+    stands apart from them does not count.
+    """
+    scene, found = problem.scene, np.zeros(len(pushed))
+    dim, normal = scene.points.shape[1], problem.constraints.normal
+    for part in problem.parts:
+        moving = np.flatnonzero(scene.free.spread(part.unknowns.astype(float))) // dim
+        bodies = np.isin(scene.body, np.unique(scene.body[moving]))
+        force = float(pushed[part.multipliers & normal].sum())
+        if force > 0:
+            found[part.multipliers] = 2 * strain_energy(state, bodies) / force
+    return found
 
 
 class _Missed(NamedTuple):

@@ -150,14 +150,15 @@ def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.array([0.0, 0.0, turning])
 
 
-def strain_energy(state: Equilibrium) -> float:
+def strain_energy(state: Equilibrium, nodes: np.ndarray | slice = slice(None)) -> float:
     """½ ∫ σ:(ε − ε₀) of the bodies in the last step, by the work of forces.
 
-    Rigid motions add none.
+    Rigid motions add none. Of the bodies of some `nodes` it is an upper bound where the scene has
+    initial strains: these count as a whole.
     """
     iterate = state.iterate
     work = iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
-    return float(work.sum() / 2 + sum(term.energy for term in iterate.terms))
+    return float(work[nodes].sum() / 2 + sum(term.energy for term in iterate.terms))
 
 
 def _both(

@@ -109,8 +109,6 @@ def _recovery(groups: Attributes, zone: Zone, slave_faces: list[FaceBlock]) -> R
     for block, number in zip(slave_faces, groups.materials_behind(slave_faces), strict=True):
         material[block.number] = number
     form = form_of(zone.recovery, order, corners)
-    if form.sweeps and zone.sweeps:
-        form = replace(form, sweeps=zone.sweeps)
     compliance = None
     if zone.stabilised:
         softness = np.array([1 / m.young for m in groups.case.materials.values()] + [0.0])
