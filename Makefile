@@ -132,7 +132,7 @@ faults: test-environment ## read 1,000 (or COUNT=…) damaged files: none may pa
 pairs: test-environment ## solve every pair of options of a case, compared with formulas; STRENGTH=3
 	@$(TESTS) tests.pairs
 
-views: test-environment ## solve 500 (or COUNT=…) random cases elsewhere, in other units, renumbered: one answer
+views: test-environment ## solve 500 (or COUNT=…) random cases elsewhere, in other units, beside others: one answer
 	@$(TESTS) tests.views $(or $(COUNT),500) $(or $(SEED),1000)
 
 mutants: test-environment ## plant faults in the core, one at a time, and see which check catches each

@@ -39,8 +39,8 @@ def _space(case: Case) -> tuple[int, str]:
     return len(case["mesh"]["bottom"]["divisions"]), case.get("plane", "strain")
 
 
-def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh]:
-    """Both in one case, and its mesh."""
+def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh, int]:
+    """Both in one case, its mesh, and how many nodes of it are those of the first."""
     meshes = [mesh_of(parse_case(json.dumps(each), Path("case"))) for each in (case, other)]
     dim, _ = _space(case)
     by = np.zeros(meshes[1].points.shape[1])
@@ -52,7 +52,7 @@ def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh]:
         key: [*one.get(key, []), *two.get(key, [])] for key in ("supports", "loads", "contact")
     }
     tables = {key: one.get(key, {}) | two.get(key, {}) for key in _NAMED}
-    return one | lists | tables, _joined(*meshes, by)
+    return one | lists | tables, _joined(*meshes, by), len(meshes[0].points)
 
 
 def _of_bodies(case: Case) -> Case:

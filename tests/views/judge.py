@@ -36,8 +36,8 @@ _ANSWERS = "solved", "unreliable"
 class Seen(NamedTuple):
     """What came of a view: a word and its reason, and the pressures and tractions (m,) in order.
 
-    `moved` (n,): how far nodes moved, in the order of that; empty where a zone bears nothing, so
-    that a body may rest anywhere. `size`: the largest pressure of all steps; `rounding`: its
+    `moved` (n,): how far nodes moved; empty where a zone bears nothing, so that a body may rest
+    anywhere. `size`: the largest pressure of all steps; `rounding`: its
     estimated relative error.
     """
 
@@ -159,7 +159,7 @@ def _moved(solved: Solved) -> np.ndarray:
     least = LEAST * solved.solution.largest_pressure
     if any(zone.multiplier.max(initial=0.0) <= least for zone in solved.solution.zones):
         return NOTHING
-    return np.sort(np.linalg.norm(solved.displacement, axis=1))
+    return np.linalg.norm(solved.displacement, axis=1)
 
 
 def compared(case: Case, most: int | None = None) -> tuple[str, list[str]]:
@@ -177,22 +177,23 @@ def _differences(case: Case, first: Seen) -> Iterator[str]:
         again = seen(other, everything, unit, length)
         yield from (f"{name}: {what}" for what in _between(first, again, name))
     if first.word in _ANSWERS:
-        yield from (f"beside: {what}" for what in _between(first, _beside(case, first), "beside"))
+        yield from (f"beside: {what}" for what in _between(*_beside(case, first), "beside"))
 
 
-def _beside(case: Case, first: Seen) -> Seen:
-    """What comes of a case with another one beside it, in which something presses everywhere.
+def _beside(case: Case, first: Seen) -> tuple[Seen, Seen]:
+    """What comes of a case alone, and with another one beside it that presses everywhere.
 
-    Its word where the other one has a worse one.
+    The second has the word of the first if only the other case has a worse one.
     """
     other = others(case)
     alone = seen(other)
     if alone.word not in _ANSWERS or not alone.moved.size:
-        return first
-    joined, mesh = beside(case, other)
+        return first, first
+    joined, mesh, n = beside(case, other)
     both = seen(joined, mesh=mesh)
     worst = max(first.word, alone.word, key=_ANSWERS.index)
-    return both._replace(moved=NOTHING, word=first.word if both.word == worst else both.word)
+    word = first.word if both.word == worst else both.word
+    return first._replace(moved=first.moved[:n]), both._replace(moved=both.moved[:n], word=word)
 
 
 def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
@@ -205,7 +206,7 @@ def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
         sizes["moved"] = float(one.moved.max())
     for quantity, size in sizes.items():
         a, b = (getattr(each, quantity) for each in (one, other))
-        if view == "renumbered":
+        if view == "renumbered" or quantity == "moved":
             a, b = np.sort(a), np.sort(b)
         apart = float(np.abs(a - b).max(initial=0.0)) / (size or 1.0)
         if apart > allowed:

@@ -11,10 +11,12 @@ from solver.lac.errors import SolveError
 from solver.lac.status import find_status
 from solver.mechanics.linear import condensation
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation.equilibrium import contact_stiffness, friction_recovery, problem
+from solver.simulation.equilibrium import contact_stiffness, friction_recovery, problem, recovery
+from solver.simulation.equilibrium.contacts import Contacts
 from solver.simulation.equilibrium.friction import Search
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement import facet_gaps, validity
+from solver.simulation.results.balance import strain_energy
 
 from .cases import FOUND, drawn, word_of
 from .judge import compared
@@ -85,6 +87,17 @@ def forgotten(_given, _before):
     return [None]
 
 
+def of_all(problem, state, pushed):
+    """Contact closes by the strain energy of all bodies, over all of its force."""
+    force = pushed[problem.constraints.normal].sum()
+    return np.full(len(pushed), 2 * strain_energy(state) / force if force > 0 else 0.0)
+
+
+def together(made):
+    """All contacts are one: none rests while another one rubs."""
+    return lambda contacts, *given: made(contacts, *given[:-1], np.zeros_like(given[-1]))
+
+
 PLANTED = {
     "left": (problem, "find_status", without_guess),
     "memory": (friction_recovery, "_starts", forgotten),
@@ -97,6 +110,10 @@ PLANTED = {
     "smooth": (CoulombContact, "_from_smooth", lambda _contact, _start: None),
     "lifts": (contact_stiffness, "_LEAST", 0.0),
     "stabilised": (ContactProblem, "__init__", from_anywhere(ContactProblem.__init__)),
+    "settled": (recovery, "MOST_SWEEPS", 3),
+    "apart": (facet_gaps, "_closing", of_all),
+    "touching": (Contacts, "__init__", together(Contacts.__init__)),
+    "soft": (ContactProblem, "gives_way_where", lambda _problem, _pressed: False),
 }
 
 

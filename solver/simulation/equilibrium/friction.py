@@ -26,6 +26,8 @@ _LOG = logging.getLogger(__name__)
 # those of a state on the way; they end as well where it falls by less than the half. A larger fault
 # than the last one is no state.
 _CORRECTIONS, _EXACT, _ON_THE_WAY, _SLOW, _TOLERATED = 6, 1e-15, 1e-12, 0.5, 1e-6
+# So often the status is found anew where it changes how contact gives way.
+_ROUNDS = 8
 _UNHELD = (
     "once its contact opens or slips: the loads part the bodies or overcome friction, or a support "
     "is missing"
@@ -61,6 +63,7 @@ class Search:
         self.closed = before.status.closed if before else None
         self.count = 0
         self._unmoved: _Unmoved | None = None
+        problem.gives_way_where(np.ones(len(numbers), dtype=bool))
 
     def settled(
         self, correction: np.ndarray | float = 0.0, on_the_way: bool = False
@@ -68,8 +71,17 @@ class Search:
         """Equilibrium under the forces `correction` (n, dim) beside those of the constants.
 
         To the last digits, or to some if it is `on_the_way` to another one. Raises SolveError where
-        none is found.
+        none is found. Contact that gives way does so where it stays closed.
         """
+        for _ in range(_ROUNDS):
+            found = self._settled(correction, on_the_way)
+            if not self.problem.gives_way_where(found.status.closed):
+                return found
+            self._unmoved = None
+            vars(self).pop("_contact", None)
+        raise SolveError("the status of stabilised contact does not settle")
+
+    def _settled(self, correction: np.ndarray | float, on_the_way: bool) -> Equilibrium:
         base, contact = self.problem.constraints, self._contact
         area = base.covered[base.eligible]
         # Bodies that went on slip by about as much.

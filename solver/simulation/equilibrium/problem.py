@@ -13,6 +13,7 @@ from ...lac.errors import SolveError
 from ...lac.motions import rigid_motions, unsupported
 from ...lac.status import StatusResult, Trial, find_status
 from ...mechanics.fem.displacement import Displacement
+from ...mechanics.linear.compliant import Compliance
 from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
@@ -82,6 +83,7 @@ class ContactProblem:
         # How contact gives way depends on what is closed: of several states it is the one that is
         # found from all closed.
         self._gives_way = any(zone.zone.gives_way for zone in scene.zones)
+        self._pressed = np.ones(len(self.constraints.area), dtype=bool)
         self.unsupported = loose
         if (resisting := scene.resisting).shape[0]:
             self.unsupported = unsupported(motions, self._motions.supports, resisting)
@@ -99,7 +101,7 @@ class ContactProblem:
             release()
         self.matrix, self.diagonal = free_stiffness(scene, unknowns, self.single)
         self.parts = parts_of(on_free, unknowns.body, scene.n_bodies)
-        soft = partial(compliance_of, scene, self.constraints.normal) if self._gives_way else None
+        soft = self._compliance if self._gives_way else None
         self._systems_of = partial(
             Systems,
             constraints=on_free,
@@ -245,6 +247,21 @@ class ContactProblem:
         if key not in self._moves:
             self._moves = {key: free_motion(self.scene, self._motions, closed)}
         return self._moves[key]
+
+    def gives_way_where(self, pressed: np.ndarray) -> bool:
+        """Let contact give way where it is `pressed` (k,) alone, of what a system has closed.
+
+        Says whether that is something else than before.
+        """
+        giving = [zone.numbers for zone in self.scene.zones if zone.zone.gives_way]
+        changed = any((pressed[mine] != self._pressed[mine]).any() for mine in giving)
+        if changed:
+            self._pressed, self._contact_stiffness = pressed, None
+            self._systems.forget()
+        return changed
+
+    def _compliance(self, closed: np.ndarray) -> Compliance:
+        return compliance_of(self.scene, self.constraints.normal, self._pressed, closed)
 
     def _at_rest(
         self,
