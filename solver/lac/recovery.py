@@ -40,6 +40,8 @@ _UNSETTLED = 1e-6
 # pressure, which is rounding: where a body is all but free to turn, a reconstruction from rounded
 # pressures turns it.
 _GROWTH, _ROUNDING = 10, 1e-9
+# What changes by no more than this share of the largest of all is rounded.
+_ROUND_OFF = 1e-14
 # Sweeps that change nearly the same are combined as one.
 _ALIKE = 1e-8
 # How often a status that the recovered pressure changes is found anew.
@@ -254,6 +256,7 @@ def settled_means(
     change: Callable[[np.ndarray], np.ndarray],
     most: int = MOST_SWEEPS,
     enough: float = SETTLED,
+    unit: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """The means (k,) whose reconstruction is applied in the last sweep, of `most` of them.
 
@@ -262,8 +265,8 @@ def settled_means(
 
     `pressure` (k,) is the one under the loads `force` (n_dofs,) of a reconstruction; `loads` gives
     those of the reconstruction of any means, `change` by how much (k,) loads change the pressure.
-    A sweep after the first that changes them by no more than the share `enough` of the largest is
-    the last one, and one that changes them far more than the first did.
+    A sweep after the first that changes them by no more than the share `enough` of the largest, or
+    of a `unit` (k,) for each, is the last one, and one that changes them far more than the first.
 
     Here loads that are the means, and lower them by a third of their own, leave 3/4 of them:
 
@@ -272,21 +275,25 @@ def settled_means(
     ([0.75], 0.333333333333)
     """
     last, first = pressure, np.inf
+    size = float(np.abs(pressure).max(initial=0.0)) or 1.0
+    unit = np.full(len(pressure), size) if unit is None else np.maximum(unit, _ROUND_OFF * size)
+    settled = np.maximum(enough * unit, _ROUND_OFF * size)
     tried: list[np.ndarray] = []
     changes: list[np.ndarray] = []
     for sweep in range(most - 1):
         following = loads(pressure)
         last = last + change(following - force)
         left = last - pressure
-        largest, size = (float(np.abs(p).max(initial=0.0)) for p in (left, pressure))
+        largest = float(np.abs(left).max(initial=0.0))
         first = first if sweep else largest
-        if sweep and (largest <= enough * size or largest > max(_GROWTH * first, _ROUNDING * size)):
+        diverges = largest > max(_GROWTH * first, _ROUNDING * size)
+        if sweep and (diverges or (np.abs(left) <= settled).all()):
             break
         step = _RELAXATION * left
         if sweep:
             moved = pressure[:, None] - np.transpose(tried)
             fell = left[:, None] - np.transpose(changes)
-            share = np.linalg.lstsq(fell, left, rcond=_ALIKE)[0]
+            share = np.linalg.lstsq(fell / unit[:, None], left / unit, rcond=_ALIKE)[0]
             step -= (moved + _RELAXATION * fell) @ share
         tried.append(pressure)
         changes.append(left)

@@ -78,6 +78,10 @@ class Accuracy:
         """The largest of them."""
         return max(self.causes.values(), default=0.0)
 
+    def with_gap(self, error: float) -> Accuracy:
+        """The same where a gap is known no better than to this relative `error` of pressures."""
+        return Accuracy(self.causes | {"gap": max(self.causes.get("gap", 0.0), error)})
+
     @property
     def of_sums(self) -> float:
         """The part that summing in higher precision removes."""

@@ -61,6 +61,10 @@ class ContactConstraints:
         """The multipliers (k,) of gaps that may close."""
         return self.eligible & self.normal
 
+    def with_jumps(self, jump: np.ndarray) -> "ContactConstraints":
+        """Those of which closed ones keep the mean gap or slip `jump` (k,)."""
+        return replace(self, initial=self.initial - self.covered * jump)
+
     @cached_property
     def dependent(self) -> np.ndarray:
         """The numbers of eligible multipliers without a free unknown of their own."""

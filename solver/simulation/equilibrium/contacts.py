@@ -114,7 +114,9 @@ class Contacts:
         return found
 
     def opens_wide(self, forces: np.ndarray, jump: np.ndarray) -> bool:
-        """Whether one of them does that does not rest."""
+        """Whether one of them does, or is open at rest."""
+        if any(not touching.all() for touching in self._resting.values()):
+            return True
         return any(one.law.opens_wide(forces[one.rows], jump[one.rows]) for one in self._acting())
 
     def kept(self, closed: np.ndarray) -> np.ndarray:

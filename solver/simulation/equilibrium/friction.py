@@ -240,8 +240,8 @@ class Search:
         closed[np.flatnonzero(base.eligible)[: len(closable)]] = closable
         closed &= base.closable
         slips[base.eligible[self.gaps]] = slipping
-        kept, rows = closed[self.gaps], closed.copy()
-        rows[self.rows] = kept & ~slips
+        kept, rows, pressed = closed[self.gaps], closed.copy(), closed.copy()
+        rows[self.rows], pressed[self.rows] = kept & ~slips, kept
         pressure, gap = found.pressure.copy(), found.gap.copy()
         total, jump = self.total.copy(), self.jump.copy()
         jump[self.rows] += gap[self.rows]
@@ -254,10 +254,18 @@ class Search:
             limit[self.rows] = np.inf
         of_gaps = np.zeros(k, dtype=bool)
         of_gaps[self.gaps] = slips
+        # Open gaps are imposed so that nothing presses there: what does is what rounding leaves.
+        imposed, residual = base.with_jumps(self.jump + found.gap), found.residual
+        iterate = found.iterate.with_closed(pressed, imposed)
+        accuracy = self.problem.accuracy(iterate, found.pressure, residual, found.force_scale)
+        left = np.abs(found.pressure[base.closable & ~closed]).max(initial=0.0)
+        if left > 0:
+            accuracy = accuracy.with_gap(left / np.abs(found.pressure).max())
         work = _work(pressure[self.rows], gap[self.rows], base.covered[self.gaps])
         return replace(
             found,
             iterate=found.iterate.with_closed(rows),
+            accuracy=accuracy,
             trial=replace(
                 found.trial,
                 pressure=pressure,

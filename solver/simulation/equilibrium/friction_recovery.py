@@ -18,11 +18,11 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.friction import of_tractions
-from ...lac.recovery import Recovery, settled_means, unsettled
+from ...lac.recovery import SETTLED, Recovery, settled_means, unsettled
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, most_sweeps, with_estimate
+from .recovery import ZoneFit, fit_of, largest_of_joined, most_sweeps, with_estimate
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -159,7 +159,8 @@ class _Sweeping:
                 raise SolveError("what pressed in the last step is open")
             return self.state
         start = self.state.pressure, self.force
-        values, first = settled_means(*start, self._added, self._change, most)
+        unit = largest_of_joined(self.search.problem, self.state.pressure)
+        values, first = settled_means(*start, self._added, self._change, most, SETTLED, unit)
         loads = [_Loads.of(zone, self.state, self.before) for zone in self.zones]
         forces = [each.force(values) for each in loads]
         couples = (each.couple(values) for each in loads)

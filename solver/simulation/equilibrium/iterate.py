@@ -117,9 +117,12 @@ class ContactIterate:
         """
         return replace(self, force=force)._with_cached(self, *_OF_DISPLACEMENT)
 
-    def with_closed(self, closed: np.ndarray) -> "ContactIterate":
-        """The same displacement with other multipliers closed (k,)."""
-        return replace(self, closed=closed)._with_cached(self, *_OF_DISPLACEMENT)
+    def with_closed(
+        self, closed: np.ndarray, constraints: ContactConstraints | None = None
+    ) -> "ContactIterate":
+        """The same displacement, others closed (k,), and with other constraints if given."""
+        other = replace(self, closed=closed, constraints=constraints or self.constraints)
+        return other._with_cached(self, *_OF_DISPLACEMENT)
 
     def _with_cached(self, other: "ContactIterate", *names: str) -> "ContactIterate":
         known = vars(other)

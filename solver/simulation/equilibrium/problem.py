@@ -18,7 +18,7 @@ from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
 from ..scene.scene import Scene
-from .accuracy import AT_REST, estimate, judged, roughness, rounding
+from .accuracy import AT_REST, Accuracy, estimate, judged, roughness, rounding
 from .compliance import compliance_of
 from .constraints import (
     ContactConstraints,
@@ -205,10 +205,9 @@ class ContactProblem:
         `jump` (k,): what they have more than `before` (k,).
         """
         base = self.constraints
-        imposed = replace(base, initial=base.initial - base.covered * (jump + before))
-        first = self._at_rest(rows, step, correction, imposed)
+        first = self._at_rest(rows, step, correction, base.with_jumps(jump + before))
         found = self._refined(first, _force_scale(first), correction)
-        iterate = replace(found.iterate, constraints=base)
+        iterate = found.iterate.with_closed(rows, base)
         trial = replace(found.trial, gap=np.where(rows, jump, iterate.gap - before))
         return replace(found, iterate=iterate, trial=trial)
 
@@ -343,23 +342,29 @@ class ContactProblem:
                 continue
             pressure = np.zeros(len(start.closed))
             pressure[start.closed] = multiplier
-            rounded, diagonal = rounding(iterate), self.diagonal
-            accuracy = estimate(
-                iterate, rounded, pressure, diagonal, self._rough, self.unsupported, residual, scale
-            )
+            accuracy = self.accuracy(iterate, pressure, residual, scale)
             extends = refine and safeguards.extended and not start.extended
             if extends and accuracy.of_sums > _EXTEND:
                 start = replace(iterate, extended=True)
                 continue
             return Equilibrium(
                 iterate=iterate,
-                trial=judged(iterate, rounded, pressure, diagonal),
+                trial=judged(iterate, rounding(iterate), pressure, self.diagonal),
                 status=StatusResult(start.closed, 1, []),
                 residual=residual,
                 force_scale=scale,
                 accuracy=accuracy,
                 correction=correction,
             )
+
+    def accuracy(
+        self, iterate: ContactIterate, pressure: np.ndarray, residual: float, scale: float
+    ) -> Accuracy:
+        """See `estimate`."""
+        rounded, diagonal = rounding(iterate), self.diagonal
+        return estimate(
+            iterate, rounded, pressure, diagonal, self._rough, self.unsupported, residual, scale
+        )
 
     def _gap_stiffness(self, step: Step) -> np.ndarray:
         """The forces (e, e) that average gaps bring up, each imposed with all others closed.

@@ -108,6 +108,14 @@ def most_sweeps(zones: Sequence[ZoneScene]) -> int:
     )
 
 
+def largest_of_joined(problem: ContactProblem, pressure: np.ndarray) -> np.ndarray:
+    """For each row (k,) the largest `pressure` (k,) on bodies that contact joins with its own."""
+    found = np.zeros(len(pressure))
+    for part in problem.parts:
+        found[part.multipliers] = np.abs(pressure[part.multipliers]).max(initial=0.0)
+    return found
+
+
 def with_estimate(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium:
     """The state with the error of its constants, by a reconstruction that is not applied."""
     fields, nothing = {}, np.zeros(state.correction.size)
@@ -131,6 +139,7 @@ def _corrected(
 ) -> _Corrected | None:
     """The state with the loads of its reconstruction; None where `most` sweeps do not settle."""
     closed, shape = state.status.closed, state.correction.shape
+    unit = largest_of_joined(problem, state.pressure)
     enough, tries = _BY_ITERATIONS if problem.linear_iterations else (SETTLED, 1)
 
     def loads(pressure: np.ndarray) -> list[np.ndarray]:
@@ -144,7 +153,7 @@ def _corrected(
 
     for _ in range(tries):
         start = state.pressure, state.correction.ravel()
-        pressure, first = settled_means(*start, added, change, most, enough)
+        pressure, first = settled_means(*start, added, change, most, enough, unit)
         state = problem.corrected(state, added(pressure).reshape(shape))
         if not unsettled(first, state.pressure - pressure, state.trial, most):
             return _Corrected(state, zones, loads(pressure))
