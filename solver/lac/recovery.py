@@ -7,7 +7,7 @@ are applied have mean zero on their macro-element: the constants stay the means.
 What constants withhold is known as soon as the means p are. It is given to the bodies as a load,
 which changes p, and so on: p ↦ p + ω (pₖ − p), ω = 0.87, until p stays as it is. The map is affine
 and contracts by 0.1–0.4 a sweep, whatever the mesh, the materials and Poisson's ratio
-(docs/recovery.md). From the second sweep on the combination of all of them is taken that leaves
+(docs/recovery.md). From the second sweep on the combination of the last four is taken that leaves
 least of pₖ − p.
 
 Source: Stetter, Numer. Math. 29 (1978) 425–443, for the deferred correction that applies them;
@@ -42,7 +42,9 @@ _UNSETTLED = 1e-6
 _GROWTH, _ROUNDING = 10, 1e-9
 # What changes by no more than this share of the largest of all is rounded.
 _ROUND_OFF = 1e-14
-# Sweeps that change nearly the same are combined as one.
+# So many sweeps are combined with one: older ones may be those of another status of friction. Those
+# that change nearly the same count as one.
+_MEMORY = 3
 _ALIKE = 1e-8
 # How often a status that the recovered pressure changes is found anew.
 _ROUNDS = 3
@@ -291,8 +293,8 @@ def settled_means(
             break
         step = _RELAXATION * left
         if sweep:
-            moved = pressure[:, None] - np.transpose(tried)
-            fell = left[:, None] - np.transpose(changes)
+            moved = pressure[:, None] - np.transpose(tried[-_MEMORY:])
+            fell = left[:, None] - np.transpose(changes[-_MEMORY:])
             share = np.linalg.lstsq(fell / unit[:, None], left / unit, rcond=_ALIKE)[0]
             step -= (moved + _RELAXATION * fell) @ share
         tried.append(pressure)

@@ -16,7 +16,7 @@ import numpy as np
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult
-from .accuracy import AT_REST, forces_at_work
+from .accuracy import AT_REST, Accuracy, forces_at_work
 from .contacts import Contacts
 from .problem import ContactProblem
 from .state import Equilibrium, Friction
@@ -240,8 +240,8 @@ class Search:
         closed[np.flatnonzero(base.eligible)[: len(closable)]] = closable
         closed &= base.closable
         slips[base.eligible[self.gaps]] = slipping
-        kept, rows, pressed = closed[self.gaps], closed.copy(), closed.copy()
-        rows[self.rows], pressed[self.rows] = kept & ~slips, kept
+        kept, rows = closed[self.gaps], closed.copy()
+        rows[self.rows] = kept & ~slips
         pressure, gap = found.pressure.copy(), found.gap.copy()
         total, jump = self.total.copy(), self.jump.copy()
         jump[self.rows] += gap[self.rows]
@@ -254,18 +254,11 @@ class Search:
             limit[self.rows] = np.inf
         of_gaps = np.zeros(k, dtype=bool)
         of_gaps[self.gaps] = slips
-        # Open gaps are imposed so that nothing presses there: what does is what rounding leaves.
-        imposed, residual = base.with_jumps(self.jump + found.gap), found.residual
-        iterate = found.iterate.with_closed(pressed, imposed)
-        accuracy = self.problem.accuracy(iterate, found.pressure, residual, found.force_scale)
-        left = np.abs(found.pressure[base.closable & ~closed]).max(initial=0.0)
-        if left > 0:
-            accuracy = accuracy.with_gap(left / np.abs(found.pressure).max())
         work = _work(pressure[self.rows], gap[self.rows], base.covered[self.gaps])
         return replace(
             found,
             iterate=found.iterate.with_closed(rows),
-            accuracy=accuracy,
+            accuracy=self._accuracy(found, closed),
             trial=replace(
                 found.trial,
                 pressure=pressure,
@@ -276,6 +269,19 @@ class Search:
             status=StatusResult(closed, self.count, []),
             friction=Friction(of_gaps, jump, total, work),
         )
+
+    def _accuracy(self, found: Equilibrium, closed: np.ndarray) -> Accuracy:
+        """The accuracy of a state of imposed jumps with the gaps `closed` (k,).
+
+        Open gaps are imposed so that nothing presses there: what does is what rounding leaves.
+        """
+        base, pressed, residual = self.problem.constraints, closed.copy(), found.residual
+        pressed[self.rows] = closed[self.gaps]
+        iterate = found.iterate.with_closed(pressed, base.with_jumps(self.jump + found.gap))
+        known = self.problem.accuracy(iterate, found.pressure, residual, found.force_scale)
+        apart = base.closable & ~closed
+        left = (np.abs(found.pressure) - found.trial.pressure_limit)[apart].max(initial=0.0)
+        return known.with_gap(left / np.abs(found.pressure).max()) if left > 0 else known
 
 
 def _work(traction: np.ndarray, slip: np.ndarray, area: np.ndarray) -> float:

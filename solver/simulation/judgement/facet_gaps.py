@@ -91,10 +91,13 @@ def _closing(problem: ContactProblem, state: Equilibrium, pushed: np.ndarray) ->
     """By how much (k,) contact closes elastically where forces `pushed` (k,) act.
 
     Twice the strain energy over ∫ p, the largest it can be, of the bodies that contact joins: what
-    stands apart from them does not count.
+    stands apart from them does not count, unless initial strains make the energy one of all.
     """
     scene, found = problem.scene, np.zeros(len(pushed))
     dim, normal = scene.points.shape[1], problem.constraints.normal
+    if any(term.energy for term in state.iterate.terms):
+        force = float(pushed[normal].sum())
+        return found + (2 * strain_energy(state) / force if force > 0 else 0.0)
     for part in problem.parts:
         moving = np.flatnonzero(scene.free.spread(part.unknowns.astype(float))) // dim
         bodies = np.isin(scene.body, np.unique(scene.body[moving]))

@@ -153,8 +153,8 @@ def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
 def strain_energy(state: Equilibrium, nodes: np.ndarray | slice = slice(None)) -> float:
     """½ ∫ σ:(ε − ε₀) of the bodies in the last step, by the work of forces.
 
-    Rigid motions add none. Of the bodies of some `nodes` it is an upper bound where the scene has
-    initial strains: these count as a whole.
+    Rigid motions add none. Of the bodies of some `nodes` it is known where no part of the scene,
+    such as an initial strain, adds to the work of forces.
     """
     iterate = state.iterate
     work = iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
