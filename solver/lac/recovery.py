@@ -316,7 +316,7 @@ def unsettled(first: float, change: np.ndarray, found: Trial, most: int = MOST_S
     """
     size = float(np.abs(change).max(initial=0.0))
     grows = size > max(_GROWTH * first, negligible(found, _ROUNDING))
-    return grows or (most == MOST_SWEEPS and size > negligible(found, _UNSETTLED))
+    return grows or (most >= MOST_SWEEPS and size > negligible(found, _UNSETTLED))
 
 
 def negligible(found: Trial, share: float) -> float:

@@ -40,7 +40,7 @@ class Contacts:
         rows: np.ndarray,
         group: np.ndarray,
     ):
-        self.m, self.of, self._rows = len(group), of, rows
+        self.m, self.of, self._count = len(group), of, len(diagonal)
         self._resting: dict[int, np.ndarray] = {}
         self._contacts, numbers = [], np.unique(group)
         if len(numbers) == 1:  # nothing to take out
@@ -121,10 +121,9 @@ class Contacts:
 
     def kept(self, closed: np.ndarray) -> np.ndarray:
         """The rows (r,) of closed gaps (m,), and of their slips."""
-        rows = np.zeros(self.m + self._rows.size, dtype=bool)
-        rows[: self.m] = closed
-        for along in self._rows:
-            rows[along] = closed[self.of]
+        rows = np.zeros(self._count, dtype=bool)
+        for one in self._contacts:
+            rows[one.rows] = one.law.kept(closed[one.gaps])
         return rows
 
     def statuses(self, forces: np.ndarray, jump: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

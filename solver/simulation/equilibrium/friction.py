@@ -78,7 +78,7 @@ class Search:
             if not self.problem.gives_way_where(found.status.closed):
                 return found
             self._unmoved = None
-            vars(self).pop("_contact", None)
+            del self._contact
         raise SolveError("the status of stabilised contact does not settle")
 
     def _settled(self, correction: np.ndarray | float, on_the_way: bool) -> Equilibrium:
