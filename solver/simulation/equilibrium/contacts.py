@@ -63,12 +63,12 @@ class Contacts:
         guess: np.ndarray | float,
         last: np.ndarray | None,
         scale: float,
-        pressed: Callable[[np.ndarray], bool],
+        nothing: float,
         rest: Rest,
     ) -> tuple[np.ndarray, np.ndarray, int] | None:
         """The same for each; None where all of them rest.
 
-        One rests, as `rest` says, if its gaps are not `pressed` (by forces), or it has no solution.
+        One rests, as `rest` says, if no force on its gaps exceeds `nothing`, or it has no solution.
         """
         found, z, most = np.zeros_like(forces), np.zeros_like(forces), 0
         guess = np.zeros_like(forces) + guess
@@ -77,7 +77,7 @@ class Contacts:
             mine = one.rows
             before = None if last is None else last[mine]
             solution = one.law.solve(forces[mine], guess[mine], before, scale)
-            if solution is None or not pressed(solution[0][: len(one.gaps)]):
+            if solution is None or solution[0][: len(one.gaps)].max(initial=0.0) <= nothing:
                 self._resting[number] = np.zeros(len(one.gaps), dtype=bool)
             else:
                 found[mine], z[mine], steps = solution

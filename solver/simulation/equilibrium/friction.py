@@ -26,6 +26,8 @@ _LOG = logging.getLogger(__name__)
 # those of a state on the way; they end as well where it falls by less than the half. A larger fault
 # than the last one is no state.
 _CORRECTIONS, _EXACT, _ON_THE_WAY, _SLOW, _TOLERATED = 6, 1e-15, 1e-12, 0.5, 1e-6
+# A contact that rounding alone may press bears less than this share of the forces at work.
+_FAINT = 1e-9
 # So often the status is found anew where it changes how contact gives way.
 _ROUNDS = 8
 _UNHELD = (
@@ -90,27 +92,24 @@ class Search:
         pressure, at_work = self._where_nothing_moves(correction)
         at_rest = area * pressure[base.eligible]
 
-        def presses(forces: np.ndarray) -> bool:
-            return bool(forces.max(initial=0.0) > AT_REST * at_work)
-
         def rest(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             unpressed = self._unpressed(gaps, at_work, correction)
             jump = (unpressed.gap - self.jump)[base.eligible]
             return unpressed.status.closed[base.eligible][: contact.m], jump
 
-        solution = contact.solve(at_rest, gone, last, at_work, presses, rest)
-        if solution is None:
-            return self._resting(at_work, correction)
-        forces, z, steps = solution
-        _LOG.info("friction: %d Newton steps", steps)
         scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
         enough = _ON_THE_WAY if on_the_way else _EXACT
-        corrected = self._corrected(z, scale, correction, enough)
-        if corrected is None:
-            return self._resting(at_work, correction)
-        found, forces, z = corrected
-        found = self._freed(forces, z, correction) or found
-        return self._with_status(found, *contact.statuses(forces, z))
+        for nothing in (AT_REST, _FAINT):
+            solution = contact.solve(at_rest, gone, last, at_work, nothing * at_work, rest)
+            if solution is None:
+                break
+            forces, z, steps = solution
+            _LOG.info("friction: %d Newton steps", steps)
+            if corrected := self._corrected(z, scale, correction, enough):
+                found, forces, z = corrected
+                found = self._freed(forces, z, correction) or found
+                return self._with_status(found, *contact.statuses(forces, z))
+        return self._resting(at_work, correction)
 
     def _where_nothing_moves(self, correction: np.ndarray | float) -> tuple[np.ndarray, float]:
         """Pressures (k,) with all closed and stuck, and the force at work.
