@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
+from solver.mechanics.mortar.coulomb import CoulombContact
 from solver.simulation.equilibrium.contacts import Contacts
 
 # Two gaps, each with one slip, on springs without coupling: those of the first are a million times
@@ -14,7 +15,8 @@ SLIPS = np.array([[2, 3]])
 
 def contacts(group, stiffness=None) -> Contacts:
     matrix = np.diag(STIFF) if stiffness is None else stiffness
-    return Contacts(matrix, STIFF, np.full(2, 0.5), np.arange(2), SLIPS, np.array(group))
+    whole = CoulombContact(matrix, STIFF, np.full(2, 0.5), np.arange(2), SLIPS)
+    return Contacts(whole, np.array(group))
 
 
 def no_rest(_gaps):

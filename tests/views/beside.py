@@ -12,7 +12,7 @@ import numpy as np
 from solver.case.reader import parse_case
 from solver.verification.run import mesh_of
 
-from .cases import Case, drawn, planes
+from .cases import Case, drawn, move_planes
 
 OTHER = "other_"
 """Groups, zones and bodies of the other case begin with this."""
@@ -46,8 +46,7 @@ def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh, int]:
     by = np.zeros(meshes[1].points.shape[1])
     by[dim - 1] = _AWAY
     one, two = _of_bodies(case), _named(_of_bodies(other))
-    for plane in planes(two):
-        plane["point"] = [x + d for x, d in zip(plane["point"], by[:dim], strict=True)]
+    move_planes(two, by[:dim].tolist())
     lists = {
         key: [*one.get(key, []), *two.get(key, [])] for key in ("supports", "loads", "contact")
     }

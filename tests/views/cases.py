@@ -69,10 +69,11 @@ def drawn(seed: int) -> Case:
     return case
 
 
-def planes(case: Case) -> list[Case]:
-    """The planes of its groups and rigid bodies."""
+def move_planes(case: Case, by: list[float]) -> None:
+    """Move the planes of groups and rigid bodies."""
     places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]
-    return [place["plane"] for place in places if "plane" in place]
+    for plane in (place["plane"] for place in places if "plane" in place):
+        plane["point"] = [x + d for x, d in zip(plane["point"], by, strict=True)]
 
 
 def _mesh(r: Random, dim: int) -> Case:

@@ -17,7 +17,7 @@ from solver.simulation.results.solution import ZoneResult
 from solver.system.errors import InputError
 
 from .beside import OTHER, beside, others
-from .cases import Case, planes
+from .cases import Case, move_planes
 
 # Stresses in other units are so many times as large, lengths too.
 UNITS, LENGTHS = 1e6, 1e-3
@@ -37,8 +37,7 @@ class Seen(NamedTuple):
     """What came of a view: a word and its reason, and the pressures and tractions (m,) in order.
 
     `moved` (n,): how far nodes moved; empty where a zone bears nothing, so that a body may rest
-    anywhere. `size`: the largest pressure of all steps; `rounding`: its
-    estimated relative error.
+    anywhere. `size`: the largest pressure of all steps; `rounding`: its estimated relative error.
     """
 
     word: str
@@ -70,8 +69,7 @@ def elsewhere(case: Case) -> Case:
     if not along and not around:
         moves["rotate"] = angle if dim == 2 else {"axis": axis, "angle": angle}
     moves["translate"] = by = [r.uniform(-2.0, 2.0) * (k > 0 or not around) for k in range(dim)]
-    for plane in planes(found):
-        plane["point"] = [x + d for x, d in zip(plane["point"], by, strict=True)]
+    move_planes(found, by)
     return found
 
 

@@ -95,7 +95,7 @@ def of_all(problem, state, pushed):
 
 def together(made):
     """All contacts are one: none rests while another one rubs."""
-    return lambda contacts, *given: made(contacts, *given[:-1], np.zeros_like(given[-1]))
+    return lambda contacts, whole, group: made(contacts, whole, np.zeros_like(group))
 
 
 PLANTED = {

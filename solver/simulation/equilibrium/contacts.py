@@ -26,36 +26,15 @@ class _Contact(NamedTuple):
 
 
 class Contacts:
-    """All contacts as one; arguments and methods are those of `CoulombContact`.
+    """The contacts that a `whole` one consists of, with its methods.
 
     `group` (m,): which contact each gap belongs to.
     """
 
-    def __init__(
-        self,
-        stiffness: np.ndarray | LinearOperator,
-        diagonal: np.ndarray,
-        friction: np.ndarray,
-        of: np.ndarray,
-        rows: np.ndarray,
-        group: np.ndarray,
-    ):
-        self.m, self.of, self._count = len(group), of, len(diagonal)
+    def __init__(self, whole: CoulombContact, group: np.ndarray):
+        self.m, self.of, self._count = whole.m, whole.of, len(whole.c)
         self._resting: dict[int, np.ndarray] = {}
-        self._contacts, numbers = [], np.unique(group)
-        if len(numbers) == 1:  # nothing to take out
-            law = CoulombContact(stiffness, diagonal, friction, of, rows)
-            all_of = np.arange(len(group)), np.arange(len(of)), slice(None)
-            self._contacts = [_Contact(*all_of, law)]
-            return
-        for number in numbers:
-            gaps, rubbing = np.flatnonzero(group == number), np.flatnonzero(group[of] == number)
-            mine = np.concatenate([gaps, rows[:, rubbing].ravel()])
-            slips = len(gaps) + np.arange(rows[:, rubbing].size).reshape(len(rows), -1)
-            own = np.searchsorted(gaps, of[rubbing])
-            part = _part_of(stiffness, mine)
-            law = CoulombContact(part, diagonal[mine], friction[rubbing], own, slips)
-            self._contacts.append(_Contact(gaps, rubbing, mine, law))
+        self._contacts = [_contact(whole, group == number) for number in np.unique(group)]
 
     def solve(
         self,
@@ -92,6 +71,10 @@ class Contacts:
                 one = self._contacts[number]
                 self._resting[number], z[one.rows] = touching[one.gaps], jump[one.rows]
         return found, z, most
+
+    def faintest(self, forces: np.ndarray) -> float:
+        """The largest force on the gaps of the one that is pressed least and does not rest."""
+        return min(float(forces[one.gaps].max()) for one in self._acting())
 
     def corrected(
         self, forces: np.ndarray, jump: np.ndarray, scale: float
@@ -140,6 +123,23 @@ class Contacts:
 
     def _acting(self) -> Sequence[_Contact]:
         return [one for n, one in enumerate(self._contacts) if n not in self._resting]
+
+
+def _contact(whole: CoulombContact, mine: np.ndarray) -> _Contact:
+    """The one whose gaps (m,) are `mine`."""
+    gaps, rubbing = np.flatnonzero(mine), np.flatnonzero(mine[whole.of])
+    if mine.all():
+        return _Contact(gaps, rubbing, slice(None), whole)
+    slips = np.array([along[rubbing] for along in whole.rows])
+    rows = np.concatenate([gaps, slips.ravel()])
+    law = CoulombContact(
+        _part_of(whole.stiffness, rows),
+        whole.c[rows],
+        whole.friction[rubbing],
+        np.searchsorted(gaps, whole.of[rubbing]),
+        len(gaps) + np.arange(slips.size).reshape(slips.shape),
+    )
+    return _Contact(gaps, rubbing, rows, law)
 
 
 def _part_of(

@@ -16,7 +16,8 @@ import numpy as np
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult
-from .accuracy import AT_REST, Accuracy, forces_at_work
+from ...mechanics.mortar.coulomb import CoulombContact
+from .accuracy import AT_REST, forces_at_work
 from .contacts import Contacts
 from .problem import ContactProblem
 from .state import Equilibrium, Friction
@@ -108,7 +109,10 @@ class Search:
             if corrected := self._corrected(z, scale, correction, enough):
                 found, forces, z = corrected
                 found = self._freed(forces, z, correction) or found
-                return self._with_status(found, *contact.statuses(forces, z))
+                state = self._with_status(found, *contact.statuses(forces, z))
+                return state if on_the_way else self._judged(found, state)
+            if contact.faintest(forces) > _FAINT * at_work:
+                break
         return self._resting(at_work, correction)
 
     def _where_nothing_moves(self, correction: np.ndarray | float) -> tuple[np.ndarray, float]:
@@ -154,7 +158,8 @@ class Search:
         trial = replace(found.trial, pressure=none, gap=found.gap - self.jump)
         closed = found.status.closed[base.eligible][: self._contact.m]
         slipping = closed[self._contact.of]
-        return self._with_status(replace(found, trial=trial), closed, slipping)
+        found = replace(found, trial=trial)
+        return self._judged(found, self._with_status(found, closed, slipping))
 
     def _corrected(
         self, z: np.ndarray, scale: float, correction: np.ndarray | float, enough: float
@@ -213,12 +218,11 @@ class Search:
         number, there = np.cumsum(rows) - 1, rows[self.gaps]
         friction, of = self.coefficient[there], number[self.gaps[there]]
         stiffness, diagonal = self.problem.contact_stiffness()
-        slips = number[self.rows[:, there]]
+        whole = CoulombContact(stiffness, diagonal, friction, of, number[self.rows[:, there]])
         group = np.zeros(len(rows), dtype=int)
         for joined, part in enumerate(self.problem.parts):
             group[part.multipliers] = joined
-        gaps = group[rows][: len(diagonal) - slips.size]
-        return Contacts(stiffness, diagonal, friction, of, slips, gaps)
+        return Contacts(whole, group[rows][: whole.m])
 
     def _why_none(self) -> str:
         """Why Newton's method found no state: a body that friction would have to hold, if any."""
@@ -257,7 +261,6 @@ class Search:
         return replace(
             found,
             iterate=found.iterate.with_closed(rows),
-            accuracy=self._accuracy(found, closed),
             trial=replace(
                 found.trial,
                 pressure=pressure,
@@ -269,18 +272,21 @@ class Search:
             friction=Friction(of_gaps, jump, total, work),
         )
 
-    def _accuracy(self, found: Equilibrium, closed: np.ndarray) -> Accuracy:
-        """The accuracy of a state of imposed jumps with the gaps `closed` (k,).
+    def _judged(self, found: Equilibrium, state: Equilibrium) -> Equilibrium:
+        """The `state` that imposed jumps, as `found`, make, with its own accuracy.
 
         Open gaps are imposed so that nothing presses there: what does is what rounding leaves.
         """
-        base, pressed, residual = self.problem.constraints, closed.copy(), found.residual
+        base, closed, residual = self.problem.constraints, state.status.closed, found.residual
+        pressed = closed.copy()
         pressed[self.rows] = closed[self.gaps]
         iterate = found.iterate.with_closed(pressed, base.with_jumps(self.jump + found.gap))
         known = self.problem.accuracy(iterate, found.pressure, residual, found.force_scale)
         apart = base.closable & ~closed
         left = (np.abs(found.pressure) - found.trial.pressure_limit)[apart].max(initial=0.0)
-        return known.with_gap(left / np.abs(found.pressure).max()) if left > 0 else known
+        if left > 0:
+            known = known.with_gap(left / np.abs(found.pressure).max())
+        return replace(state, accuracy=known)
 
 
 def _work(traction: np.ndarray, slip: np.ndarray, area: np.ndarray) -> float:

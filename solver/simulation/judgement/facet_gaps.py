@@ -20,7 +20,7 @@ from ...lac.cells.faces import FaceBlock, area_vectors, surface_normals
 from ...lac.cells.shape import shape_functions
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
-from ..results.balance import strain_energy
+from ..results.balance import strain_energy, work_of_forces
 from ..scene.scene import Scene, ZoneScene
 
 # A vertex whose mean normal leans by more against a face's own is on an edge of the body.
@@ -98,12 +98,12 @@ def _closing(problem: ContactProblem, state: Equilibrium, pushed: np.ndarray) ->
     if any(term.energy for term in state.iterate.terms):
         force = float(pushed[normal].sum())
         return found + (2 * strain_energy(state) / force if force > 0 else 0.0)
+    work = np.bincount(scene.body, work_of_forces(state).sum(axis=1).astype(float))
     for part in problem.parts:
         moving = np.flatnonzero(scene.free.spread(part.unknowns.astype(float))) // dim
-        bodies = np.isin(scene.body, np.unique(scene.body[moving]))
         force = float(pushed[part.multipliers & normal].sum())
         if force > 0:
-            found[part.multipliers] = 2 * strain_energy(state, bodies) / force
+            found[part.multipliers] = work[np.unique(scene.body[moving])].sum() / force
     return found
 
 

@@ -150,15 +150,22 @@ def moment(scene: Scene, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.array([0.0, 0.0, turning])
 
 
-def strain_energy(state: Equilibrium, nodes: np.ndarray | slice = slice(None)) -> float:
+def strain_energy(state: Equilibrium) -> float:
     """½ ∫ σ:(ε − ε₀) of the bodies in the last step, by the work of forces.
 
-    Rigid motions add none. Of the bodies of some `nodes` it is known where no part of the scene,
-    such as an initial strain, adds to the work of forces.
+    Rigid motions add none.
+    """
+    energy = sum(term.energy for term in state.iterate.terms)
+    return float(work_of_forces(state).sum() / 2 + energy)
+
+
+def work_of_forces(state: Equilibrium) -> np.ndarray:
+    """Internal forces times displacements (n, dim), of which half is strain energy.
+
+    Initial strains add to that.
     """
     iterate = state.iterate
-    work = iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
-    return float(work[nodes].sum() / 2 + sum(term.energy for term in iterate.terms))
+    return iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
 
 
 def _both(
