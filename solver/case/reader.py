@@ -97,7 +97,7 @@ class _Reader:
                 transform=content.get("transform"),
                 counts=content.get("counts", {}),
             ),
-            materials=self.materials,
+            materials=self.deforming(),
             supports=self.acting("supports", file.supports),
             loads=self.acting("loads", file.loads),
             zones=tuple(
@@ -117,6 +117,11 @@ class _Reader:
         # Last: keys of all parts select groups.
         mesh = replace(made.mesh, selections=tuple(self.selections.values()))
         return replace(made, mesh=mesh)
+
+    def deforming(self) -> dict[str, Material]:
+        """The materials, without those of rigid bodies where others are left."""
+        rigid = {group for group, body in self.file.bodies.items() if body.rigid}
+        return {g: m for g, m in self.materials.items() if g not in rigid} or self.materials
 
     def mesh_source(self) -> dict[str, Any]:
         """Where the mesh comes from: a file, by its path, or a recipe."""

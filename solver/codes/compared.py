@@ -121,6 +121,7 @@ class Compared:
             whole = all(known) and len(known) == len(self.model.case.zones)
             of_each = errors(each if whole else replace(each, zones=[]))
             found |= {name: value for name, value in of_each.items() if np.isfinite(value)}
+        found |= self._largest_of_stress() if "stress_max" not in found else {}
         means = any(surface.kind == "face" for surface in self.pressures_by_zone)
         more = any(zone.recovery != "none" for zone in self.model.case.zones)
         more |= any(zone.operator.nodes is not None for zone in self.model.scene.zones)
@@ -128,6 +129,18 @@ class Compared:
             # The case asks for more than means, which the result does not give.
             found = {n: v for n, v in found.items() if n not in ("pressure_l2", "pressure_max")}
         return found
+
+    def _largest_of_stress(self) -> dict[str, float]:
+        """The error of the stress at its places, where it is not at all nodes: at vertices, say."""
+        exact = self.model.case.reference.exact
+        if exact is None or "stress" not in exact.quantities or "stress" not in self.placed:
+            return {}
+        placed = self._deformable("stress")
+        if placed.cells is not None or not len(placed.places):
+            return {}
+        wanted = exact.stress(placed.places, self._part(placed))
+        size = float(np.abs(wanted).max(initial=0.0))
+        return {"stress_max": float(np.abs(placed.values - wanted).max()) / size} if size else {}
 
     def _balance(self) -> dict[str, float]:
         """How far contact forces are from what balances the loads, relative, by zone."""

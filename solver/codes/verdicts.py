@@ -210,6 +210,8 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
     verdict = judge(solution, checks)
     where, missing = extents(compared), compared.not_given(ran)
     wanted = [name for name in NEEDED if {*CHECKED_BY[name]} & {*missing, *ran}]
+    unchecked = compared.unchecked(ran)
+    too_few = [name for name in unchecked if {*CHECKED_BY[name]} & {*missing}]
     if verdict.verdict == PASSED or (verdict.verdict == SOLVED and wanted):
         asked_for = wanted if only is None else [name for name in wanted if name in only]
         less = [
@@ -218,7 +220,7 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
             if name not in where or not where[name].whole or not {*CHECKED_BY[name]} & {*ran}
         ]
         if less or not asked_for:
-            why = _incomplete(where, less)
+            why = _incomplete(where, less, too_few)
             verdict = replace(verdict, verdict=PARTIAL, judged="", reason=why)
     cause = compared.faults([check for check in checks if not check.passed])
     if cause and verdict.verdict == FAILED:
@@ -226,7 +228,11 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
     named = _named(verdict, foreign.code, foreign.version, foreign.settings)
     return replace(
         named,
-        plan=[[name, "given; the case has no check of it"] for name in compared.unchecked(ran)],
+        plan=[
+            [name, "given; the case has no check of it"]
+            for name in unchecked
+            if name not in too_few
+        ],
         values=replace(
             verdict.values,
             pressure=compared.extremes("pressure"),
@@ -247,17 +253,20 @@ def _judged(compared: Compared, only: Sequence[str] | None) -> Verdict:
             printed_digits=foreign.digits,
             not_given=missing,
             only=[name for name in wanted if name in only] if only and {*wanted} - {*only} else [],
-            compared={name: str(extent) for name, extent in where.items()},
+            compared={n: str(extent) for n, extent in where.items() if n not in too_few},
         ),
     )
 
 
-def _incomplete(where: Mapping[str, Extent], less: Sequence[str]) -> str:
+def _incomplete(where: Mapping[str, Extent], less: Sequence[str], too_few: Sequence[str]) -> str:
     """What was compared and what was not, in words."""
-    given = [f"{name} at {extent}" for name, extent in where.items()]
-    absent = [name for name in less if name not in where]
-    text = f"compared: {', '.join(given) or 'nothing'}"
-    return f"{text}; not given: {', '.join(absent)}" if absent else text
+    given = {name: f"{name} at {extent}" for name, extent in where.items()}
+    texts = {
+        "compared": [text for name, text in given.items() if name not in too_few] or ["nothing"],
+        "not given": [name for name in less if name not in given],
+        "too few values for its checks": [given[name] for name in less if name in too_few],
+    }
+    return "; ".join(f"{what}: {', '.join(names)}" for what, names in texts.items() if names)
 
 
 def _write_fields(path: Path, foreign: ForeignResult) -> None:

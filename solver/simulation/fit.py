@@ -111,7 +111,7 @@ def _probe(scene: Scene, name: str) -> Iterator[InputError]:
     try:
         if probe.zone:
             zone = next(zone for zone in scene.zones if zone.zone.name == probe.zone)
-            faces_at(scene, name, [(block.type.name, block.nodes) for block in zone.slave_faces])
+            faces_at(scene, name, [(block.type.name, block.nodes) for block in zone.sub_faces])
         elif not probe.group:
             cell_at(scene, name)
     except InputError as error:

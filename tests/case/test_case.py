@@ -95,6 +95,15 @@ def test_one_tolerance_stands_for_all():
     assert parse_case(MINIMAL + "tolerance: 1e-3", PATH).reference.tolerance == {"all": 1e-3}
 
 
+def test_a_rigid_body_has_no_material():
+    """Its modulus is no scale of displacements or pressures; alone it is kept."""
+    text = FULL.replace("materials:\n", "materials:\n  die: {young: 1.0, poisson: 0.0}\n", 1)
+    assert text != FULL
+    assert parse_case(text, PATH).materials == parse_case(FULL, PATH).materials
+    alone = MINIMAL + "bodies: {all: {rigid: true}}\n"
+    assert parse_case(alone, PATH).materials == parse_case(MINIMAL, PATH).materials
+
+
 def test_numbers_are_floats():
     case = parse_case(FULL, PATH)
     assert all(type(m.young) is float for m in case.materials.values())

@@ -206,9 +206,10 @@ def test_a_force_on_a_group_is_one_per_depth():
     assert total == pytest.approx([0, -1250 * deck.points[:, 2].max(), 0], abs=1e-9)
 
 
+@pytest.mark.parametrize("group", ["bottom", "all"])
 @pytest.mark.parametrize("code", CODES[1:2])
-def test_rigid_bodies_have_no_stress(code, tmp_path):
-    more = {"materials": {"bottom": {"young": 2000.0, "poisson": 0.3}}, "loads": []}
+def test_rigid_bodies_have_no_stress(code, group, tmp_path):
+    more = {"materials": {group: {"young": 2000.0, "poisson": 0.3}}, "loads": []}
     more |= {"bodies": {"top": {"rigid": True}}}
     more["supports"] = [{"group": "symx", "fix": ["x"]}, {"group": "base", "fix": {"y": 0.5}}]
     found = run_code(code, deck_of(*case_of("QUAD4", "QUAD4", **more)), tmp_path, Limits())

@@ -12,7 +12,7 @@ import numpy as np
 from solver.case.reader import parse_case
 from solver.verification.run import mesh_of
 
-from .cases import Case, drawn, move_planes
+from .cases import Case, by_body, drawn, move_planes
 
 OTHER = "other_"
 """Groups, zones and bodies of the other case begin with this."""
@@ -57,9 +57,7 @@ def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh, int]:
 def _of_bodies(case: Case) -> Case:
     """A copy without its mesh, each body with a material of its own."""
     found = {k: deepcopy(v) for k, v in case.items() if k not in ("mesh", "transform")}
-    if whole := found["materials"].get("all"):
-        found["materials"] = {"bottom": whole, "top": whole}
-    return found
+    return found | {"materials": by_body(found["materials"])}
 
 
 def _named(value: Any) -> Any:

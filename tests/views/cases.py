@@ -69,6 +69,12 @@ def drawn(seed: int) -> Case:
     return case
 
 
+def by_body(materials: Case) -> Case:
+    """The materials of a case, each body with its own."""
+    whole = materials.get("all")
+    return {"bottom": whole, "top": whole} if whole else materials
+
+
 def move_planes(case: Case, by: list[float]) -> None:
     """Move the planes of groups and rigid bodies."""
     places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]

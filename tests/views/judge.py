@@ -17,7 +17,7 @@ from solver.simulation.results.solution import ZoneResult
 from solver.system.errors import InputError
 
 from .beside import OTHER, beside, others
-from .cases import Case, move_planes
+from .cases import Case, by_body, move_planes
 
 # Stresses in other units are so many times as large, lengths too.
 UNITS, LENGTHS = 1e6, 1e-3
@@ -50,13 +50,19 @@ class Seen(NamedTuple):
 
 
 def views(case: Case) -> Iterator[tuple[str, Case, bool]]:
-    """The other views of a case: name, mapping, whether all work is done that may be left out."""
+    """The other views of a case: name, mapping, whether all work is done that may be left out.
+
+    A `bare` rigid body has no material.
+    """
     yield "everything", case, True
     yield "other units", in_other_units(case), False
     yield "renumbered", in_another_order(case), False
     yield "elsewhere", elsewhere(case), False
     steps = case.get("steps", [1.0])
     yield "last step again", case | {"steps": [*steps, steps[-1]]}, False
+    if rigid := {name for name, body in case.get("bodies", {}).items() if body.get("rigid")}:
+        of_others = {g: m for g, m in by_body(case["materials"]).items() if g not in rigid}
+        yield "bare", case | {"materials": of_others}, False
 
 
 def elsewhere(case: Case) -> Case:

@@ -17,6 +17,7 @@ from solver.simulation.equilibrium.friction import Search
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement import facet_gaps, validity
 from solver.simulation.results.balance import strain_energy
+from solver.simulation.scene.attributes import Attributes
 
 from .cases import FOUND, drawn, word_of
 from .judge import compared
@@ -98,6 +99,11 @@ def together(made):
     return lambda contacts, whole, group: made(contacts, whole, np.zeros_like(group))
 
 
+def deforming(groups):
+    """Rigid bodies have the material that the case gives to all."""
+    return ((group, each) for group, each in groups.case.materials.items() if group != "all")
+
+
 PLANTED = {
     "left": (problem, "find_status", without_guess),
     "memory": (friction_recovery, "_starts", forgotten),
@@ -113,6 +119,7 @@ PLANTED = {
     "settled": (recovery, "MOST_SWEEPS", 3),
     "apart": (facet_gaps, "_closing", of_all),
     "touching": (Contacts, "__init__", together(Contacts.__init__)),
+    "bare": (Attributes, "_materials", deforming),
     "soft": (ContactProblem, "gives_way_where", lambda _problem, _pressed: False),
 }
 

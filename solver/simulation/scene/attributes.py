@@ -74,15 +74,19 @@ class Attributes(CutGroups):
     ) -> dict[str, np.ndarray]:
         """A value of the material of each cell (n,) by type; a group's own goes before `all`.
 
-        `otherwise`: of cells without a material, which belong to rigid bodies.
+        `otherwise`: of cells of rigid bodies.
         """
-        materials = self.case.materials
-        start = value(materials[ALL]) if ALL in materials else otherwise
+        start = value(self.case.materials[ALL]) if ALL in self.case.materials else otherwise
         values = {name: np.full(len(c), float(start)) for name, c in self.cut.cells.items()}
-        for group in (g for g in materials if g != ALL):
+        for group, material in self._materials():
             for name, mask in self.cell_mask(group).items():
-                values[name][mask] = value(materials[group])
+                values[name][mask] = otherwise if material is None else value(material)
         return values
+
+    def _materials(self) -> Iterator[tuple[str, Material | None]]:
+        """The groups with a material of their own, then the rigid bodies with cells, with none."""
+        yield from ((group, m) for group, m in self.case.materials.items() if group != ALL)
+        yield from ((name, None) for name, body in self.case.rigid.items() if not body.surface)
 
     def materials_behind(self, faces: Sequence[FaceBlock]) -> list[np.ndarray]:
         """A number (n,) of the material of the cell behind each face as meshed, by block.
@@ -93,10 +97,11 @@ class Attributes(CutGroups):
         number = {material: i for i, material in enumerate(materials.values())}
         start = number[materials[ALL]] if ALL in materials else -1
         found = [np.full(len(block.owner), start) for block in faces]
-        for group in (g for g in materials if g != ALL):
+        for group, material in self._materials():
             mask = self.whole_cell_mask(group)
             for values, block in zip(found, faces, strict=True):
-                values[mask[block.owner_type.name][block.owner]] = number[materials[group]]
+                behind = mask[block.owner_type.name][block.owner]
+                values[behind] = -1 if material is None else number[material]
         return found
 
     @property
