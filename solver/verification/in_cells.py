@@ -49,7 +49,7 @@ def in_cells(
     points, kind, cells = solution.mesh.points, cell_type(block.type), block.data[chosen]
     values, nodal = shape_functions(kind.name).values(reference), solution.displacement[cells]
     shapes = shapes_in(points, kind, cells, reference, solution.case.axisymmetric)
-    mixed = solution.fields.mean_stress.get(kind.name)
+    mixed = solution.fields.by_cell.get(kind.name)
     return InCells(
         shapes=shapes,
         place=values @ points[cells],

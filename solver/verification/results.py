@@ -111,9 +111,9 @@ def _write(
     file.create_group("accuracy").attrs.update(solution.quality.accuracy)
     file.create_group("validity").attrs.update(asdict(solution.quality.validity))
     file.create_group("errors").attrs.update(solution.quality.errors)
-    mean_stress = file.create_group("mean_stress")
-    for kind, values in solution.fields.mean_stress.items():
-        mean_stress[kind] = values
+    in_cells = file.create_group("mean_stress")
+    for kind, values in solution.fields.by_cell.items():
+        in_cells[kind] = values
     contact = file.create_group("contact")
     for number, zone in enumerate(solution.zones):
         write_zone(contact.create_group(zone.name), zone, number)
@@ -199,7 +199,7 @@ def _read_solution(file: h5py.File) -> Solution:
         fields=Fields(
             body=point_data["body"],
             normal_stress=point_data["normal_stress"],
-            mean_stress={kind: data[()] for kind, data in file["mean_stress"].items()},
+            by_cell={kind: data[()] for kind, data in file["mean_stress"].items()},
             **vectors,
         ),
         cost=Cost(

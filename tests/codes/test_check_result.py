@@ -352,34 +352,6 @@ def test_a_part_of_a_result_is_no_verification(which):
     assert check_foreign(case, foreign(**whole), mesh).verdict == "passed"
 
 
-def test_values_at_the_vertices_of_quadratic_cells():
-    """Stress is compared where it is; norms of the displacement need it at all nodes."""
-    mesh, case = results.mesh_and_case("manufactured/quad8")
-    exact, points = case.reference.exact, mesh.points[:, :2]
-    blocks = zip(mesh.cells, mesh.cell_sets["top"], strict=True)
-    vertices = np.unique(np.concatenate([b.data[rows][:, :4] for b, rows in blocks if len(rows)]))
-    slave = results.slave_nodes(mesh, case)
-
-    def at(nodes, values, factor=1.0):
-        values[len(values) // 2] *= factor
-        return Field(places=points[nodes], values=values)
-
-    def found(moved, factor=1.0):
-        stress = at(vertices, exact.stress(points[vertices], np.zeros(len(vertices), int)), factor)
-        moved = at(moved, exact.displacement(points[moved], np.zeros(len(moved), int)))
-        pressure = at(slave, exact.contact_pressure(points[slave]))
-        given = foreign(displacement=moved, stress=stress, pressure=pressure)
-        return check_foreign(case, given, mesh)
-
-    assert found(np.arange(len(points))).verdict == "passed"
-    wrong = found(np.arange(len(points)), 1.1)
-    assert [check.name for check in wrong.checks if not check.passed] == ["stress_max"]
-    less = found(vertices)
-    assert less.verdict == "partial"
-    assert "too few values for its checks: displacement at 289 of 289 nodes" in less.reason
-    assert less.foreign.compared.keys() == {"stress", "pressure"}
-
-
 def test_a_part_may_be_asked_for():
     mesh, case = results.mesh_and_case("ssnp170/a")
     _, whole = parts(results.patch())

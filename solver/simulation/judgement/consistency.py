@@ -20,7 +20,7 @@ from ..results.solution import Solution, ZoneResult
 _TOLERANCE, _ROUNDINGS = 1e-8, 1e3
 # What is not known everywhere, or not yet, and what is no number.
 _MAY_BE_NAN = {
-    *("case", "mean_stress", "pressure_error", "probes", "errors", "validity", "earlier"),
+    *("case", "by_cell", "pressure_error", "probes", "errors", "validity", "earlier"),
     *("cpu_seconds", "peak_memory_mb"),
 }
 

@@ -106,16 +106,16 @@ class Fields:
 
     `body` (n,) of each node; `normal_stress` (n,) is d·σ·d with d the mean slave normal of the
     first zone; `reaction` (n, dim) the forces at nodes with which supports, rigid bodies, springs
-    and ties hold the bodies, of the last load factor. `mean_stress` holds, by cell type, the stress
-    s of cells in mixed form at their nodes (n_cells, n_nodes), NaN in other cells (see
-    `solver.mechanics.fem.mixed`). `motion` (n, dim) of bodies that may move far, which the mesh of
-    the solution has made.
+    and ties hold the bodies, of the last load factor. `by_cell` holds what parts have solved for in
+    cells, by type: of the mixed form the stress s at their nodes (n_cells, n_nodes), NaN in other
+    cells (see `solver.mechanics.fem.mixed`). `motion` (n, dim) of bodies that may move far, which
+    the mesh of the solution has made.
     """
 
     body: np.ndarray
     normal_stress: np.ndarray
     reaction: np.ndarray | None = None
-    mean_stress: dict[str, np.ndarray] = field(default_factory=dict)
+    by_cell: dict[str, np.ndarray] = field(default_factory=dict)
     motion: np.ndarray | None = None
 
 

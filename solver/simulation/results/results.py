@@ -50,10 +50,10 @@ def solution_of(problem: ContactProblem, states: list[Equilibrium], plan: list[L
     stress = nodal_stress(
         scene.points, scene.blocks, last.iterate.deformation, last.iterate.extended
     )
-    mean_stress: dict[str, np.ndarray] = {}
+    by_cell: dict[str, np.ndarray] = {}
     for term in last.iterate.terms:
         stress += term.stress(scene.blocks)
-        mean_stress |= term.by_cell(scene.mesh.cells)
+        by_cell |= term.by_cell(scene.mesh.cells)
     if scene.case.thin:
         stress[:, 2] = 0.0
     scale = stress_scale(scene, states, stress)
@@ -76,7 +76,7 @@ def solution_of(problem: ContactProblem, states: list[Equilibrium], plan: list[L
             body=scene.body,
             normal_stress=normal_stress(stress, _contact_direction(scene)),
             reaction=at_nodes,
-            mean_stress=mean_stress,
+            by_cell=by_cell,
         ),
         cost=Cost(
             dofs=scene.n_dofs,

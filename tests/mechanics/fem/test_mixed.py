@@ -144,13 +144,13 @@ def test_ordinary_material_stays_as_it_is():
         simulate(parse_case(block_case(2).about.source.replace("0.3", p), Path("patch.yaml")), mesh)
         for p in ("0.3", "0.3, form: displacement", "0.3, form: mixed")
     )
-    assert not plain.fields.mean_stress
+    assert not plain.fields.by_cell
     assert np.array_equal(plain.stress, chosen.stress)
     assert np.array_equal(plain.displacement, chosen.displacement)
-    assert set(mixed.fields.mean_stress) == {"TRIA6", "QUAD8"}
+    assert set(mixed.fields.by_cell) == {"TRIA6", "QUAD8"}
     assert np.abs(mixed.stress - plain.stress).max() < 1e-12 * 25
     told = [line.what for line in mixed.plan if line.what.startswith("mixed form")]
-    assert told == [f"mixed form in {sum(map(len, mixed.fields.mean_stress.values()))} cells"]
+    assert told == [f"mixed form in {sum(map(len, mixed.fields.by_cell.values()))} cells"]
 
 
 @pytest.mark.parametrize(("poisson", "mixed"), [(0.499, False), (0.4991, True)])
