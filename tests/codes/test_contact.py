@@ -1,4 +1,4 @@
-"""Results on meshes of their own, and at some nodes: errors and forces are those of what is given."""
+"""Results on meshes of their own, and at some nodes alone."""
 
 import meshio
 import numpy as np
