@@ -18,12 +18,12 @@ import meshio
 import numpy as np
 
 from ..lac.cells.catalogue import BY_NAME
-from ..lac.cells.faces import FaceBlock, surface_nodes
+from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
 from ..mesh.files.abaqus import data_lines, face_number
 from ..system.errors import InputError
 from ..system.process import cores_for, run_in_subprocess
-from .deck import Deck, UnsupportedError, face_size
+from .deck import Deck, UnsupportedError, are_flat, face_size
 from .files.read import read_result_files
 from .foreign import Field, ForeignResult
 from .shifted import with_layers
@@ -43,7 +43,6 @@ MOVING = 1.0
 # Faces that end on the axis carry no contact: a bore of this radius, over the model's extent.
 _BORE = 1e-6
 _CORRECTION = 1e-5
-_PLANE = 1e-6
 # By default a correction of 1 % of the largest displacement ends the iterations.
 _CONTROLS = ("*CONTROLS, PARAMETERS=FIELD", f"0.005, {_CORRECTION:g}")
 # Of a step on which bodies move far, the largest part that is solved at once, and the most parts.
@@ -345,19 +344,9 @@ def _faces(deck: Deck, blocks: Sequence[FaceBlock]) -> Iterator[tuple[int, int]]
         yield from zip((first + block.owner).tolist(), numbers[block.local].tolist(), strict=True)
 
 
-def _flat(deck: Deck) -> bool:
-    """Whether the slave surface of each pair lies in a plane."""
-    for pair in deck.pairs:
-        nodes = surface_nodes(pair.slave)
-        away = deck.points[nodes] - deck.points[nodes].mean(axis=0)
-        sizes = np.linalg.svd(away, compute_uv=False)
-        if len(sizes) == away.shape[1] and sizes[-1] > _PLANE * sizes[0]:
-            return False
-    return True
-
-
 def _contact(deck: Deck, stiffness: float) -> Iterator[str]:
-    stiffness = stiffness if not deck.pairs or _flat(deck) else min(stiffness, ON_CURVES)
+    flat = all(are_flat(deck, pair) for pair in deck.pairs)
+    stiffness = stiffness if flat else min(stiffness, ON_CURVES)
     stiffness = min(stiffness, MOVING) if deck.path else stiffness
     slope = stiffness * deck.softest / face_size(deck) if deck.pairs else 0.0
     names: dict[float, str] = {}

@@ -147,6 +147,8 @@ def _gaps(
     return np.einsum("nd,nd->n", offset, normals[near]) - zone.interference
 
 
+# Normals of a flat surface differ by no more.
+_FLAT = 1e-6
 # What the cells of a rigid body are made of; all their nodes are held.
 _RIGID = Material(1.0, 0.0)
 
@@ -360,6 +362,13 @@ def _paired(case: Case, mesh: meshio.Mesh, number: int, flat: int) -> PairedFace
         nodes = surface_nodes(slave)
         gap[nodes] = evaluate(zone.clearance, mesh.points[nodes, :flat]) - zone.interference
     return PairedFaces(zone=zone, slave=slave, master=master, gap=gap)
+
+
+def are_flat(deck: Deck, pair: PairedFaces) -> bool:
+    """Whether the normals of both sides agree everywhere."""
+    outward = surface_normals(deck.points, pair.slave)[surface_nodes(pair.slave)]
+    facing = surface_normals(deck.points, pair.master)[surface_nodes(pair.master)]
+    return bool(np.abs(np.concatenate([-outward, facing]) - facing[0]).max() < _FLAT)
 
 
 def face_size(deck: Deck) -> float:

@@ -146,9 +146,13 @@ class Model:
         return found
 
     def face_size(self, zone: ZoneResult) -> np.ndarray:
-        """How wide the slave faces (m,) of a zone are."""
+        """How wide the slave faces (m,) of a zone are; of long ones how far they reach."""
         at = surface_points(self.points, zone.faces)
-        return np.bincount(at.macro, at.weight) ** (1 / (self.dim - 1))
+        found = np.bincount(at.macro, at.weight) ** (1 / (self.dim - 1))
+        for _, nodes, macro in zone.faces:
+            away = np.linalg.norm(self.points[nodes] - zone.centre[macro, None], axis=2)
+            found[macro] = np.maximum(found[macro], away.max(axis=1))
+        return found
 
     @cached_property
     def rigid(self) -> np.ndarray:

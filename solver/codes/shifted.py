@@ -16,13 +16,11 @@ from scipy.spatial import cKDTree
 
 from ..case.material import Material
 from ..lac.cells.faces import FaceBlock, surface_nodes, surface_normals
-from .deck import Deck, PairedFaces, UnsupportedError
+from .deck import Deck, PairedFaces, UnsupportedError, are_flat
 from .layer import columns
 
 # Thickness over the extent of the model, and stiffness over the softest body's.
 _THIN, _SOFT = 1e-3, 1e-6
-# Normals of a flat surface differ by no more.
-_FLAT = 1e-6
 # Curved surfaces fit if their gap is off by less, on the median, over the extent of the model.
 _FIT = 1e-4
 # The level of a node in the outer face of the layer; 0 is the inner one, 2 between.
@@ -46,7 +44,7 @@ def with_layers(deck: Deck) -> tuple[Deck, np.ndarray]:
 
 def _as_meshed(deck: Deck, pair: PairedFaces) -> PairedFaces:
     """The pair; one with a number as gap between curved faces without this number."""
-    if not isinstance(pair.zone.clearance, float) or _are_flat(deck, pair):
+    if not isinstance(pair.zone.clearance, float) or are_flat(deck, pair):
         return pair
     extent = np.ptp(deck.points, axis=0).max()
     if abs(np.median(_meshed_gap(deck, pair)) - pair.zone.clearance) > _FIT * extent:
@@ -132,18 +130,11 @@ def _with_layer(deck: Deck, number: int) -> tuple[Deck, np.ndarray]:
     return longer, new
 
 
-def _are_flat(deck: Deck, pair: PairedFaces) -> bool:
-    """Whether the normals of both sides agree everywhere."""
-    outward = surface_normals(deck.points, pair.slave)[surface_nodes(pair.slave)]
-    facing = surface_normals(deck.points, pair.master)[surface_nodes(pair.master)]
-    return bool(np.abs(np.concatenate([-outward, facing]) - facing[0]).max() < _FLAT)
-
-
 def _shift(deck: Deck, pair: PairedFaces, nodes: np.ndarray) -> np.ndarray:
     """How far outward (k,) the slave's nodes are moved."""
     if pair.gap is None:
         return np.full(len(nodes), pair.zone.interference)
-    if not _are_flat(deck, pair):
+    if not are_flat(deck, pair):
         raise UnsupportedError("initial gap by place on curved faces: CalculiX takes one number")
     other = surface_nodes(pair.master)[0]
     facing = surface_normals(deck.points, pair.master)[other]

@@ -13,6 +13,7 @@ from solver.lac.errors import SolveError
 from solver.mechanics.fem.faces import boundary_faces
 from solver.mesh.files import abaqus
 from tests.codes.blocks import CELLS_2D, CELLS_3D, case_of
+from tests.codes.results import mesh_and_case
 
 # From the manual of CalculiX 2.20, chapter "Element Types": the two nodes between which each node
 # past the corners lies, the corners of the faces S1, S2, …, all counted from 1.
@@ -221,6 +222,14 @@ def test_the_stiffness_of_contact_has_a_unit():
     assert size == pytest.approx(50 / np.sqrt(sum(len(b.nodes) for b in quads)))
     mesh.points *= 2
     assert face_size(deck_of(case, mesh)) == pytest.approx(2 * size)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_contact_is_softer_where_either_side_is_curved(swapped):
+    mesh, case = mesh_and_case("hertz/cylinder-quad4")
+    deck = deck_of(case.as_solved(swapped), mesh, layer=True)
+    [[stiffness]] = blocks_of(deck_lines(deck))["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
+    assert float(stiffness) == pytest.approx(2e2 * deck.softest / face_size(deck))
 
 
 def test_printed_forces():

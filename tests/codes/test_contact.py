@@ -8,6 +8,7 @@ from solver.codes.foreign import Field, ForeignResult
 from solver.codes.verdicts import check_foreign
 from solver.lac.motions import body_numbers
 from tests.codes import results
+from tests.codes.blocks import case_of
 
 
 def test_norms_are_integrated_on_another_mesh():
@@ -47,6 +48,18 @@ def test_the_error_of_a_displacement_is_integrated_on_another_mesh():
         case, ForeignResult(code="mine", mesh=plain, displacement=given), other
     ).estimates.errors
     assert found["displacement_l2"] == pytest.approx(0.1, rel=1e-3)
+
+
+def test_long_faces_have_the_values_at_their_corners():
+    """Faces of 50 × 5: the corners are farther away than the root of the area."""
+    body = {"cells": "HEXA8", "divisions": [1, 10, 1]}
+    more = {"mesh": {"recipe": "blocks", "size": 50, "bottom": body, "top": body}}
+    case, mesh = case_of("HEXA8", "HEXA8", **more)
+    at = mesh.points[results.slave_nodes(mesh, case)]
+
+    pressure = Field(places=at, values=np.full(len(at), 25.0))
+    verdict = check_foreign(case, ForeignResult(code="mine", pressure=pressure), mesh)
+    assert verdict.verdict == "passed", verdict.reason
 
 
 def test_values_at_the_vertices_of_quadratic_cells():

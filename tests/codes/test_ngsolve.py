@@ -66,6 +66,7 @@ def test_the_penalty_follows_the_size_of_a_face(tmp_path):
     NGSOLVE.write(deck_of(*case_of("QUAD4", "QUAD4")), tmp_path)
     told = json.loads((tmp_path / "deck.json").read_text())
     assert told["face_size"] == pytest.approx(50 / 3)
+    assert told["flat"]
     # Rigid bodies have the last material.
     assert told["materials"] == [{"young": 2000.0, "poisson": 0.3}, {"young": 1.0, "poisson": 0.0}]
 
