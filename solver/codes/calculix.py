@@ -23,7 +23,7 @@ from ..lac.errors import SolveError
 from ..mesh.files.abaqus import data_lines, face_number
 from ..system.errors import InputError
 from ..system.process import cores_for, run_in_subprocess
-from .deck import Deck, UnsupportedError, are_flat, face_size
+from .deck import Deck, UnsupportedError, face_size
 from .files.read import read_result_files
 from .foreign import Field, ForeignResult
 from .shifted import with_layers
@@ -345,8 +345,7 @@ def _faces(deck: Deck, blocks: Sequence[FaceBlock]) -> Iterator[tuple[int, int]]
 
 
 def _contact(deck: Deck, stiffness: float) -> Iterator[str]:
-    flat = all(are_flat(deck, pair) for pair in deck.pairs)
-    stiffness = stiffness if flat else min(stiffness, ON_CURVES)
+    stiffness = stiffness if deck.flat else min(stiffness, ON_CURVES)
     stiffness = min(stiffness, MOVING) if deck.path else stiffness
     slope = stiffness * deck.softest / face_size(deck) if deck.pairs else 0.0
     names: dict[float, str] = {}

@@ -17,7 +17,7 @@ from ..simulation.results.records import Quality
 from ..simulation.results.solution import Solution, ZoneResult
 from ..system.errors import InputError
 from ..verification import samples
-from ..verification.norms import errors
+from ..verification.norms import errors, largest_error
 from ..verification.samples import Reference, Sample
 from ..verification.verdict import CheckResult
 from .contact import SurfaceValues, own_solution, pressure_force, surfaces
@@ -143,8 +143,7 @@ class Compared:
         if placed.cells is not None or not len(placed.places):
             return {}
         wanted = exact.stress(placed.places, self._part(placed))
-        size = float(np.abs(wanted).max(initial=0.0))
-        return {"stress_max": float(np.abs(placed.values - wanted).max()) / size} if size else {}
+        return {"stress_max": largest_error(placed.values, wanted)}
 
     def _balance(self) -> dict[str, float]:
         """How far contact forces are from what balances the loads, relative, by zone."""

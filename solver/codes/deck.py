@@ -206,6 +206,11 @@ class Deck:
         return dict(zip(self.cells, counts.tolist(), strict=False))
 
     @property
+    def flat(self) -> bool:
+        """Whether the two surfaces of each pair are flat, and parallel."""
+        return all(are_flat(self, pair) for pair in self.pairs)
+
+    @property
     def softest(self) -> float:
         """The smallest Young's modulus of a deformable body."""
         return min(m.young for m in self.case.materials.values())

@@ -146,12 +146,16 @@ class Model:
         return found
 
     def face_size(self, zone: ZoneResult) -> np.ndarray:
-        """How wide the slave faces (m,) of a zone are; of long ones how far they reach."""
+        """How wide the slave faces (m,) of a zone are."""
         at = surface_points(self.points, zone.faces)
-        found = np.bincount(at.macro, at.weight) ** (1 / (self.dim - 1))
+        return np.bincount(at.macro, at.weight) ** (1 / (self.dim - 1))
+
+    def reach(self, zone: ZoneResult) -> np.ndarray:
+        """How far the nodes of the slave faces (m,) of a zone are from their centres, at most."""
+        found = np.zeros(len(zone.centre))
         for _, nodes, macro in zone.faces:
             away = np.linalg.norm(self.points[nodes] - zone.centre[macro, None], axis=2)
-            found[macro] = np.maximum(found[macro], away.max(axis=1))
+            found[macro] = away.max(axis=1)
         return found
 
     @cached_property

@@ -6,7 +6,7 @@ displacement]; `oblique`: [node, direction, displacement along it]; `forces`: [n
 all loads; `start`: displacements (n, dim) that close open bodies which contact alone holds;
 `contact`: pairs with the nodes of slave and master faces by type, turned outward, and the initial
 gap as [node, gap] (null: as meshed, less `interference`). `face_size`: of a slave face, a length.
-`flat`: whether all normals of each pair agree.
+`flat`: whether the two surfaces of each pair are flat, and parallel.
 
 A code may answer with `result.json`: `displacement`, `stress` and `pressure`, each rows of a node
 and its values. Stress is xx, yy, zz, xy, yz, xz, or in plane strain xx, yy, xy.
@@ -21,7 +21,7 @@ import numpy as np
 
 from ..lac.cells.faces import FaceBlock
 from ..lac.errors import SolveError
-from .deck import Deck, PairedFaces, UnsupportedError, are_flat, face_size, refuse_rings
+from .deck import Deck, PairedFaces, UnsupportedError, face_size, refuse_rings
 from .foreign import Field, ForeignResult
 
 FILE, RESULT = "deck.json", "result.json"
@@ -76,7 +76,7 @@ def content(deck: Deck) -> dict[str, Any]:
     return {
         "name": deck.case.name,
         "face_size": face_size(deck),
-        "flat": all(are_flat(deck, pair) for pair in deck.pairs),
+        "flat": deck.flat,
         "points": deck.points.tolist(),
         "cells": {name: cells.tolist() for name, cells in deck.cells.items()},
         "materials": [{"young": m.young, "poisson": m.poisson} for m in deck.materials],

@@ -111,10 +111,11 @@ def _on_surfaces(compared: Compared, given: list[SurfaceValues]) -> Extent:
         for surface in given:
             if surface.zone.name != zone.name:
                 continue
-            places = surface.placed.places
-            size = compared.model.face_size(zone)
+            places, model = surface.placed.places, compared.model
             near, _ = cKDTree(places).query(zone.centre)
-            beside = _BESIDE * np.maximum(size, _spacing(places))
+            beside = _BESIDE * np.maximum(model.face_size(zone), _spacing(places))
+            # The corners of a long face are farther away.
+            beside = np.maximum(beside, model.reach(zone) + NEAR * model.length)
             count += int((covered & (near <= beside)).sum())
     return Extent(count, total, "contact faces")
 
