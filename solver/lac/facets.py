@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .cells.catalogue import CellType
-from .cells.faces import area_vectors, surface_nodes, surface_normals, surface_vectors
+from .cells.faces import FLAT, area_vectors, surface_nodes, surface_normals, surface_vectors
 from .cells.shape import invert, shape_functions
 from .errors import SolveError
 
-# Below these shares of a face's size, its bending and the skew of its map are round-off.
-FLAT = 1e-9
+# Below this share of a face's size, the skew of its map is round-off.
 _AFFINE = 1e-12
 # Newton's method stops at steps below the first (in parts of a face) and accepts the second.
 _CONVERGED, _ACCEPTED = 1e-13, 1e-8

@@ -13,8 +13,8 @@ from typing import Self
 
 import numpy as np
 
-# Edges whose middle is off the chord by less than this share of it are straight.
-_BENT = 1e-13
+from .cells.faces import FLAT
+
 # Halvings after which an interval within [0, 1] is as short as rounding allows.
 _HALVINGS = 54
 
@@ -224,7 +224,7 @@ def _boundary(
     """
     chord = np.roll(corner, -1, axis=1) - corner
     sideways = _cross(chord, bulge)
-    bent = np.abs(sideways) > _BENT * (chord**2).sum(axis=2)
+    bent = np.abs(sideways) > FLAT * (chord**2).sum(axis=2)
     lines, dents, caps = [], [], []
     for k in range(corner.shape[1]):
         line = Curves(origin=corner[:, k], along=chord[:, k], idle=~chord[:, k].any(axis=1))

@@ -13,10 +13,10 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.csgraph import connected_components
 
+from .cells.faces import FLAT
+
 # So often normals are averaged over neighbours.
 _ROUNDS = 3
-# Normals that differ by less are those of a flat surface.
-_BENT = 1e-9
 # Normals of neighbours that differ by less, in more than rounding, belong to one smooth surface.
 _KINK = np.cos(np.radians(40)) + 1e-9
 # Vertices this near to a quadric, by the size of the surface, lie on it.
@@ -70,7 +70,7 @@ def smoothed(gaps: sparse.csr_matrix, surface: Smooth) -> sparse.csr_matrix:
     for _ in range(_ROUNDS):
         smooth = weight @ smooth
         smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-    if np.abs(smooth - normal).max() <= _BENT:
+    if np.abs(smooth - normal).max() <= FLAT:
         return gaps
     entries = gaps.tocoo()
     row, node, axis = entries.row, entries.col // dim, entries.col % dim

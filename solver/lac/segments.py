@@ -20,7 +20,7 @@ from typing import Self
 
 import numpy as np
 
-from .cells.faces import circumference
+from .cells.faces import FLAT, circumference
 from .cells.shape import invert, shape_functions, simplex_rule
 from .clipping import Image, Pieces, clip, overlap, quadrature
 from .facets import Facets, project_along
@@ -45,8 +45,6 @@ from .threads import prefetch
 _BENT_DEGREES = 6
 # Pairs cut at once: few enough for their polygons to stay in the processor's cache.
 _PAIRS_AT_ONCE = 4096
-# Edges whose middle is off the chord by less than this share of it look straight.
-_STRAIGHT = 1e-12
 # The ends of a line are looked for this far beyond a bent face, in parts of its length.
 _MARGIN = 0.05
 
@@ -177,10 +175,10 @@ def _among(behind: Behind, chosen: np.ndarray, count: int) -> Behind:
 
 
 def _looks_straight(corner: np.ndarray, bulge: np.ndarray) -> np.ndarray:
-    """Which outlines (p,) have straight edges only."""
+    """Which outlines (p,) have straight edges only: whose middles are off the chord by no more."""
     chord = np.roll(corner, -1, axis=1) - corner
     sideways = chord[..., 0] * bulge[..., 1] - chord[..., 1] * bulge[..., 0]
-    return (np.abs(sideways) <= _STRAIGHT * (chord**2).sum(axis=2)).all(axis=1)
+    return (np.abs(sideways) <= FLAT * (chord**2).sum(axis=2)).all(axis=1)
 
 
 def _degree(pairs: Pairs) -> int:

@@ -29,7 +29,7 @@ from .judgement.validity import NOTED_SLIP, validity
 from .options import Options
 from .results.fields import grid_fields
 from .results.forces import RigidMotion
-from .results.records import Validity
+from .results.records import Validity, largest_of
 from .results.results import solution_of
 from .results.solution import Line, Position, Solution
 from .scene.attributes import Attributes
@@ -261,8 +261,8 @@ def _joined(case: Case, found: Sequence[Solution]) -> Solution:
         cost=replace(last.cost, iterations=sum(one.cost.iterations or 0 for one in found)),
         quality=replace(
             last.quality,
-            balance=_largest([one.balance for one in quality]),
-            accuracy=_largest([one.accuracy for one in quality]),
+            balance=largest_of([one.balance for one in quality]),
+            accuracy=largest_of([one.accuracy for one in quality]),
             validity=Validity.worst([one.validity for one in quality]),
         ),
         earlier=[_position(one, kept) for one in found[:-1]],
@@ -280,9 +280,3 @@ def _position(step: Solution, kept: tuple[dict[str, np.ndarray], ...]) -> Positi
         for own, last in pairs
     )
     return Position(step.mesh.points, *fields)
-
-
-def _largest(found: Sequence[dict[str, float]]) -> dict[str, float]:
-    """The largest value of each name."""
-    names = dict.fromkeys(name for one in found for name in one)
-    return {name: max(one.get(name, 0.0) for one in found) for name in names}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..simulation.equilibrium.accuracy import stress_of_motion
+from ..simulation.equilibrium.rest import stress_of_motion
 from ..simulation.results.exact import ExactValues
 from ..simulation.results.solution import Solution, ZoneResult
 from .coverage import expected_coverage

@@ -21,7 +21,7 @@ import numpy as np
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.neighbours import SAME_SIDE, vertex_neighbours
 from ..lac.facets import tangents_of
-from ..simulation.equilibrium.accuracy import stress_of_motion
+from ..simulation.equilibrium.rest import stress_of_motion
 from ..simulation.judgement.validity import allowed_of_pressure
 from ..simulation.results.solution import Solution, ZoneResult
 

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.lac.clipping import clip, overlap, triangles
+from solver.lac.clipping import clip, overlap, quadrature, triangles
+from solver.lac.regions import Regions, clip_to_face
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -53,6 +54,24 @@ def test_slivers_are_kept(shift):
     assert left + right == pytest.approx(1.0, abs=1e-15)
     assert right == pytest.approx(shift, abs=2e-16)
     assert right > 0
+
+
+@pytest.mark.parametrize("noise", [1e-15, 1e-12, 1e-10, 1e-8])
+def test_edges_that_are_straight_but_for_rounding_have_no_common_area(noise):
+    """A triangle on a square, with middles of edges that are not half-way."""
+    rng = np.random.default_rng(1)
+
+    def rounded(corners, n=400):
+        chord = np.roll(corners, -1, axis=0) - corners
+        bulge = 0.2 * rng.uniform(-1, 1, (n, len(corners), 1)) * chord
+        return (a + noise * rng.uniform(-1, 1, bulge.shape) for a in (corners, bulge))
+
+    start, bulge = rounded(np.array([[0.0, 1.0], [1.0, 1.0], [0.3, 1.9]]))
+    triangle = Regions(start=start, bulge=bulge, count=np.full(len(start), 3))
+    for _, part in clip_to_face(triangle, *rounded(SQUARE)):
+        for _, points, weights in quadrature(part, 2):
+            assert np.abs(weights.sum(axis=1)).max(initial=0.0) < 5 * noise + 1e-15
+            assert np.abs(points).max(initial=0.0) < 2
 
 
 seeds = st.integers(0, 10_000)

@@ -4,6 +4,7 @@ Two unit squares; the uniform state has σ_yy = −p and sinks by (1 − ν²) p
 """
 
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 
 from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
+from solver.simulation import simulate
+from solver.simulation.equilibrium.accuracy import Accuracy
 from solver.system.errors import InputError
 from solver.verification.checks import run_checks
 from solver.verification.judge import judge
@@ -223,3 +226,21 @@ def test_the_steps_before_one_without_a_solution_are_kept(tmp_path):
     pressures = [step.resultants["zone"].force[1] for step in again.steps]
     assert pressures == pytest.approx([-33, -58])
     assert check(tmp_path / "result.vtkhdf").reason == verdict.reason
+
+
+def test_the_worst_step_counts_for_digits_and_balance(monkeypatch):
+    """The first of two steps has no digits, and half as much pressure again as its loads."""
+    right = simulate.solution_of
+
+    def first_step_wrong(problem, states, plan):
+        trial = replace(states[0].trial, pressure=1.5 * states[0].pressure)
+        wrong = replace(states[0], trial=trial, accuracy=Accuracy({"gap": 0.5}))
+        return right(problem, [wrong, *states[1:]], plan)
+
+    monkeypatch.setattr(simulate, "solution_of", first_step_wrong)
+    case = parse_case(
+        CASE + "steps: [{press: 1, weight: 0}, {press: 0.5, weight: 0}]\n", Path("case.yaml")
+    )
+    solution = simulate.simulate(case, block_mesh("QUAD8", "QUAD4", (3, 2)))
+    assert solution.quality.accuracy["gap"] == 0.5
+    assert solution.quality.balance["free nodes: force"] > 0.01

@@ -216,6 +216,13 @@ def test_fits_and_rings_that_facets_break(inner, outer, slave, pushed):
     assert "error of the pressure not estimated" in str(found)
 
 
+def test_a_pressure_that_facets_break_is_no_better_once_its_load_is_gone():
+    case = rings(5, 7, "top", load=100.0)
+    found = solve_case(case | {"steps": [1.0, 0.0]})
+    assert found.verdict == "unreliable"
+    assert "facets" in found.reason
+
+
 @pytest.mark.parametrize(
     "given",
     [

@@ -39,9 +39,14 @@ def _space(case: Case) -> tuple[int, str]:
     return len(case["mesh"]["bottom"]["divisions"]), case.get("plane", "strain")
 
 
+def meshed(case: Case) -> meshio.Mesh:
+    """The mesh of a case."""
+    return mesh_of(parse_case(json.dumps(case), Path("case")))
+
+
 def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh, int]:
     """Both in one case, its mesh, and how many nodes of it are those of the first."""
-    meshes = [mesh_of(parse_case(json.dumps(each), Path("case"))) for each in (case, other)]
+    meshes = [meshed(each) for each in (case, other)]
     dim, _ = _space(case)
     by = np.zeros(meshes[1].points.shape[1])
     by[dim - 1] = _AWAY

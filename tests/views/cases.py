@@ -22,8 +22,8 @@ FRICTION = (0.0, 0.0, 0.0, 0.05, 0.1, 0.3, 0.5, 1.0, 2.0, 10.0)
 RECOVERY = ("none", "none", "linear", "quadratic", "smooth", "automatic")
 OTHERS = ("uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual")
 
-# Facets of curved contact change their pressure by more than a tenth.
-_FACETED = ("frames", "smooth", "apart")
+# Facets of curved contact change their pressure by more than a tenth, or are as deep as it closes.
+_FACETED = ("frames", "smooth", "apart", "rest", "left")
 FOUND: dict[str, Case] = yaml.safe_load((Path(__file__).parent / "found.yaml").read_text())
 
 

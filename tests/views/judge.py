@@ -16,7 +16,7 @@ from solver.lac.errors import SolveError
 from solver.simulation.results.solution import ZoneResult
 from solver.system.errors import InputError
 
-from .beside import OTHER, beside, others
+from .beside import OTHER, beside, meshed, others
 from .cases import Case, by_body, move_planes
 
 # Stresses in other units are so many times as large, lengths too.
@@ -24,6 +24,9 @@ UNITS, LENGTHS = 1e6, 1e-3
 # Pressures and tractions are the same up to this share of the largest pressure of all steps, or so
 # many times what the solve itself says that rounding may change.
 SAME, ROUNDINGS = 1e-8, 10.0
+# Coordinates of a mesh that was moved or written lose so much of its extent; stiff bodies under
+# small loads are pressed by it.
+LOST, PRESSED = 1e-14, 1e-6
 # A zone whose largest pressure is below this share of the largest of all bears nothing.
 LEAST = 1e-9
 # A solve takes less than a second.
@@ -180,8 +183,19 @@ def _differences(case: Case, first: Seen) -> Iterator[str]:
         unit, length = (UNITS, LENGTHS) if name == "other units" else (1.0, 1.0)
         again = seen(other, everything, unit, length)
         yield from (f"{name}: {what}" for what in _between(first, again, name))
+    if first.word != "refused":
+        again = seen(case, mesh=rounded(case))
+        yield from (f"rounded: {what}" for what in _between(first, again, "rounded"))
     if first.word in _ANSWERS:
         yield from (f"beside: {what}" for what in _between(*_beside(case, first), "beside"))
+
+
+def rounded(case: Case) -> meshio.Mesh:
+    """The mesh of a case, its coordinates less some of their last digits."""
+    mesh, r = meshed(case), np.random.default_rng(len(case["name"]))
+    extent = np.ptp(mesh.points, axis=0)
+    mesh.points += LOST * extent * r.uniform(-1.0, 1.0, mesh.points.shape)
+    return mesh
 
 
 def _beside(case: Case, first: Seen) -> tuple[Seen, Seen]:
@@ -204,7 +218,8 @@ def _between(one: Seen, other: Seen, view: str) -> Iterator[str]:
     if one.word != other.word:
         yield f"{one.word} ({one.reason}) and {other.word} ({other.reason})"
         return
-    allowed = max(SAME, ROUNDINGS * max(one.rounding, other.rounding))
+    same = PRESSED if view == "rounded" else SAME
+    allowed = max(same, ROUNDINGS * max(one.rounding, other.rounding))
     sizes = {"pressure": one.size, "traction": one.size}
     if one.moved.size and other.moved.size:
         sizes["moved"] = float(one.moved.max())

@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 
 from solver.lac import reconstruction
+from solver.lac.cells import faces
 from solver.lac.errors import SolveError
 from solver.lac.status import find_status
 from solver.mechanics.linear import condensation
@@ -71,11 +72,12 @@ def no_rest(search, _at_work, _correction):
 
 def by_rounding(true):
     """Facets are judged by pressures that are rounding."""
-    return lambda problem, state: true(problem, replace(state, trial=_known(state.trial)))
+    return lambda problem, states: true(problem, [_known(state) for state in states])
 
 
-def _known(trial):
-    return replace(trial, pressure_limit=0 * trial.pressure_limit)
+def _known(state):
+    trial = replace(state.trial, pressure_limit=0 * state.trial.pressure_limit)
+    return replace(state, trial=trial)
 
 
 def without_guess(*search):
@@ -120,6 +122,7 @@ PLANTED = {
     "apart": (facet_gaps, "_closing", of_all),
     "touching": (Contacts, "__init__", together(Contacts.__init__)),
     "bare": (Attributes, "_materials", deforming),
+    "rounded": (faces, "FLAT", 1e-15),
     "soft": (ContactProblem, "gives_way_where", lambda _problem, _pressed: False),
 }
 

@@ -10,8 +10,10 @@ from ..threads import prefetch
 from .catalogue import CellType, cell_type
 from .shape import gauss_rule, shape_functions
 
-# Below this share of the product of the edges that span it, a corner counts as flat.
-_FLAT = 1e-12
+FLAT = 1e-9
+"""What bends or leans by less than this share is straight: meshes are rounded by about as much."""
+# Below this share of the product of the edges that span it, a corner has no area.
+_NO_CORNER = 1e-12
 # Cells that are looked at together.
 _AT_ONCE = 1 << 12
 
@@ -67,7 +69,7 @@ def right_side_out(
     def judged(first: int) -> list[np.ndarray]:
         jacobian = vertex_jacobians(points, cells[first : first + _AT_ONCE], cell)
         mirrored = (jacobian < 0).all(axis=1)
-        flat = (np.abs(jacobian) <= _FLAT).any(axis=1)
+        flat = (np.abs(jacobian) <= _NO_CORNER).any(axis=1)
         return [mirrored, flat | ((jacobian < 0).any(axis=1) & ~mirrored)]
 
     parts = list(prefetch(judged, range(0, max(1, len(cells)), _AT_ONCE)))
@@ -196,8 +198,8 @@ def nodal_normals(points: np.ndarray, faces: list[tuple[str, np.ndarray]]) -> np
     """Unit normals (n_points, dim) of a surface of faces (type, nodes) at its nodes.
 
     The mean of the normals there of the faces around a node, weighted by area; zero away from the
-    surface. Components of round-off size are zero, so that a plane along the axes has normals along
-    the axes.
+    surface. Components below `FLAT` are zero, so that a plane along the axes has normals along the
+    axes.
     """
     total = np.zeros_like(points)
     for name, nodes in faces:
@@ -207,7 +209,7 @@ def nodal_normals(points: np.ndarray, faces: list[tuple[str, np.ndarray]]) -> np
         )
     length = np.linalg.norm(total, axis=1, keepdims=True)
     total /= np.where(length > 0, length, 1.0)
-    total[np.abs(total) < 16 * np.finfo(float).eps] = 0.0
+    total[np.abs(total) < FLAT] = 0.0
     return total
 
 

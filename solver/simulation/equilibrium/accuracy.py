@@ -29,15 +29,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ...case.model import Case
-from ...lac.cells.faces import FaceBlock, area_vectors
+from ...lac.cells.faces import FLAT, FaceBlock, area_vectors
 from ...lac.cells.shape import shape_functions
-from ...lac.facets import FLAT
 from ...lac.status import Trial
 from ...mechanics.fem.block import Block
 from ...mechanics.fem.stress import steepest, steepness
 from ..scene.scene import Scene
 from .iterate import ContactIterate
+from .rest import AT_REST, forces_of_others, rests, stress_at_rest
 
 EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
@@ -47,14 +46,11 @@ LEAST_DIGITS = 4
 # Pressures and gaps below this share of their scales are round-off and change no status; gaps below
 # the second share of the displacements they are the difference of, or below so many roundings of
 # the coordinates, are so too; and pressures below so many times their estimated error.
-_NOISE, _NOISE_OF_MOTION, _ROUNDINGS, _ERRORS = 1e-10, 1e-13, 8, 10
+_NOISE, _NOISE_OF_MOTION, _ROUNDINGS, ERRORS = 1e-10, 1e-13, 8, 10
 # A motion that gaps resist by no more than this share of what they resist most is not held by them.
 _UNHELD = 1e-8
 # Rows of the motions of bodies, of which copies are made, at once.
 _AT_ONCE = 1 << 20
-
-AT_REST = 1e-12
-"""Forces below this share of the loads of all steps are none."""
 
 _REASONS = {
     "forces": "the terms that add up to its forces are far larger than they",
@@ -255,7 +251,8 @@ def estimate(
     scale = float(np.abs(pressure).max(initial=0.0))
     moved = iterate.displacement.total.reshape(scene.points.shape)
     if scale == 0:
-        return Accuracy({"forces": float(forces.max()) / max(force_scale, _at_rest(iterate))})
+        force_scale = max(force_scale, forces_of_others(iterate))
+        return Accuracy({"forces": float(forces.max()) / force_scale})
     by_unknown = np.repeat(forces, scene.points.shape[1])
     noise = by_unknown + residual * force_scale
     moving, gaps = constraints.moving[closed], constraints.gaps[closed]
@@ -301,42 +298,13 @@ def _resultants(loose: sparse.csr_matrix, sums: np.ndarray, loads: np.ndarray) -
 
 def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float, loaded: float) -> float:
     """What loads (`loaded`), strains or motions cause where the `pressure` is rounding; else 0."""
-    at_rest = _at_rest(iterate) > 0
+    # Without loads the forces are those of initial strains.
+    at_rest = not loaded or forces_of_others(iterate) > 0
     stress = stress_at_rest(iterate.scene, iterate.displacement.total)
     nothing = AT_REST * max(loaded, stress if at_rest else 0.0)
-    if pressure <= nothing or (at_rest and error >= pressure):
+    if pressure <= nothing or (at_rest and error >= pressure) or rests(iterate):
         return max(loaded, stress, iterate.sizes.highest)
     return loaded if error >= pressure else 0.0
-
-
-def _at_rest(iterate: ContactIterate) -> float:
-    """The largest nodal force that loads of other steps or motions cause; 0 where a force acts."""
-    scene = iterate.scene
-    caused = force_at_rest(scene, iterate.displacement.total)
-    in_all = max(scene.loads.at_work.force, caused)
-    return in_all if float(np.abs(iterate.force).max()) <= AT_REST * in_all else 0.0
-
-
-def stress_at_rest(scene: Scene, displacement: np.ndarray) -> float:
-    """The stress that a displacement, or what supports impose at load factor 1, would cause."""
-    largest = np.array([np.abs(displacement).max(initial=0.0), scene.loads.at_work.motion])
-    return stress_of_motion(scene.case, scene.coordinates.length, largest)
-
-
-def force_at_rest(scene: Scene, displacement: np.ndarray) -> float:
-    """That stress on the model's whole extent, a force."""
-    return stress_at_rest(scene, displacement) * scene.coordinates.length ** (scene.space - 1)
-
-
-def forces_at_work(scene: Scene, displacement: np.ndarray) -> float:
-    """The largest nodal force of the loads of all steps, else what motions would cause."""
-    return scene.loads.at_work.force or force_at_rest(scene, displacement)
-
-
-def stress_of_motion(case: Case, length: float, displacement: np.ndarray) -> float:
-    """The stress that a displacement (n, dim) would cause as a strain over the model's length."""
-    young = max(material.young for material in case.materials.values())
-    return young * float(np.abs(displacement).max(initial=0.0)) / length
 
 
 def judged(
@@ -353,7 +321,7 @@ def judged(
     unbalanced = np.abs(scene.free.spread(left))
     forces, known = np.repeat(rounded.forces, dim), rounded.gaps
     moving, limit = constraints.moving, np.zeros(len(pressure))
-    of_others = AT_REST * _at_rest(iterate)
+    of_others = AT_REST * forces_of_others(iterate)
     loose = np.diff(iterate.displacement.motions.indptr) > 0
     handed_on = np.full_like(forces, np.linalg.norm(forces[loose]))
     for zone in scene.zones:
@@ -361,16 +329,16 @@ def judged(
         places = constraints.gaps[mine].indices
         stress = iterate.sizes.stress[places // dim].max(initial=0.0)
         scale = max(float(np.abs(pressure[mine]).max(initial=0.0)), float(stress))
-        noise = forces + unbalanced[places].max(initial=0.0) + of_others / _ERRORS
+        noise = forces + unbalanced[places].max(initial=0.0) + of_others / ERRORS
         for rows in zone.rows:
             # Of what may close: a sliver under the end of the master has no pressure to round.
             there = constraints.eligible[rows]
             acting = moving[rows][there]
             error = pressure_of_forces(acting, noise)
             error += pressure_of_gaps(acting, known[rows][there], diagonal)
-            limit[rows] = _NOISE * scale + _ERRORS * error
+            limit[rows] = _NOISE * scale + ERRORS * error
             if loose[places].any():
-                least = _ERRORS * pressure_of_forces(acting, handed_on)
+                least = ERRORS * pressure_of_forces(acting, handed_on)
                 if np.abs(pressure[rows]).max(initial=0.0) <= least:
                     limit[rows] = np.maximum(limit[rows], least)
     motion = abs(constraints.gaps) @ np.abs(iterate.displacement.total)

@@ -17,9 +17,9 @@ from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
-from .accuracy import AT_REST, forces_at_work
 from .contacts import Contacts
 from .problem import ContactProblem
+from .rest import AT_REST, forces_at_work
 from .state import Equilibrium, Friction
 
 _LOG = logging.getLogger(__name__)
@@ -145,7 +145,9 @@ class Search:
             found = self.problem.solve(self.step, self.closed, correction=correction)
         except SolveError:
             raise SolveError(self._why_none()) from None
-        pressed = base.covered * np.maximum(found.pressure - found.trial.pressure_limit, 0.0)
+        # Where all others may bear tension up to their limit, one may bear what balances them.
+        limit = max(int(found.status.closed.sum()), 1) * found.trial.pressure_limit
+        pressed = base.covered * np.maximum(found.pressure - limit, 0.0)
         if (pressed[base.eligible][: len(gaps)][gaps] > AT_REST * at_work).any():
             raise SolveError(self._why_none())
         return found

@@ -18,7 +18,7 @@ from ...mechanics.linear.condensation import ROUND_OFF, ConstrainedSystem, solve
 from ...mechanics.linear.systems import Systems, parts_of
 from ...system.process import release
 from ..scene.scene import Scene
-from .accuracy import AT_REST, Accuracy, estimate, judged, roughness, rounding
+from .accuracy import Accuracy, estimate, judged, roughness, rounding
 from .compliance import compliance_of
 from .constraints import (
     ContactConstraints,
@@ -33,6 +33,7 @@ from .constraints import (
 )
 from .contact_stiffness import contact_stiffness, stiffness_of
 from .iterate import ContactIterate
+from .rest import AT_REST
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)

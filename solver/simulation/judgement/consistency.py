@@ -12,12 +12,14 @@ from typing import Any
 import meshio
 import numpy as np
 
+from ..equilibrium.accuracy import ERRORS
 from ..results.solution import Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
-# roundings of coordinates and displacements, a pressure by its estimated error and by what so many
-# roundings of displacements and loads are as stress.
-_TOLERANCE, _ROUNDINGS = 1e-8, 1e3
+# roundings of coordinates and displacements, a pressure by what so many roundings of displacements
+# are as stress, and by the last share of the largest of all steps, or as many errors of that as the
+# search for the status allows: what loads that are none leave.
+_TOLERANCE, _ROUNDINGS, _OF_ALL = 1e-8, 1e3, 1e-9
 # What is not known everywhere, or not yet, and what is no number.
 _MAY_BE_NAN = {
     *("case", "by_cell", "pressure_error", "probes", "errors", "validity", "earlier"),
@@ -68,14 +70,13 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     moved, contact = solution.displacement[nodes], zone.nodal or zone
     own = float(np.abs(contact.multiplier).max(initial=0.0))
     scale = max(own, float(np.abs(solution.stress[nodes]).max(initial=0.0)))
-    largest = max(float(np.abs(other.multiplier).max(initial=0.0)) for other in solution.zones)
     round_off = _ROUNDINGS * float(np.finfo(float).eps)
     young = max(material.young for material in solution.case.materials.values())
     dim = 3 if solution.case.axisymmetric else moved.shape[1]
     smallest = float(zone.area.min()) ** (1 / (dim - 1))
     error = round_off * young * float(np.abs(solution.displacement).max()) / smallest
-    error += max(solution.quality.accuracy.values(), default=0.0) * largest
-    error += round_off * solution.largest_pressure
+    known = max(_OF_ALL, ERRORS * max(solution.quality.accuracy.values(), default=0.0))
+    error += known * solution.largest_pressure
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"

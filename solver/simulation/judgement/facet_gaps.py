@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from ...lac.cells.faces import FaceBlock, area_vectors, surface_normals
+from ...lac.cells.faces import FLAT, FaceBlock, area_vectors, surface_normals
 from ...lac.cells.shape import shape_functions
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.state import Equilibrium
@@ -25,6 +25,8 @@ from ..scene.scene import Scene, ZoneScene
 
 # A vertex whose mean normal leans by more against a face's own is on an edge of the body.
 _EDGE = np.cos(np.radians(25))
+# A pressure below this share of the zone's largest of all steps is none.
+_RESIDUE = 1e-4
 # Gaps of mesh and case agree where they differ by less than this share of what facets may miss;
 # bodies whose gap is smaller touch.
 _FITS = 1e-3
@@ -41,39 +43,61 @@ class _Bend(NamedTuple):
 
 
 class FacetEffect(NamedTuple):
-    """What facets do, the most of all zones; zero without any.
+    """What facets do, the most of all zones and steps; zero without any.
 
     `pressure`: the L2 change of a zone's pressure by the gap that facets add on the average, over
     the pressure; `depth`: how far facets miss their surfaces, over the elastic closing of the
     contact, or over the smallest gap that is left where nothing touches.
     """
 
-    pressure: float
-    depth: float
+    pressure: float = 0.0
+    depth: float = 0.0
 
 
-def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
-    """What facets do to a state, its status kept.
+def facets_of(problem: ContactProblem, states: Sequence[Equilibrium]) -> FacetEffect:
+    """What facets do to each zone in the last step that presses it, or in the last of all.
+
+    A pressure that is next to nothing beside those of other steps is what a rounded mesh does not
+    fit by.
+    """
+    judged: dict[int, set[str]] = {}
+    for zone in problem.scene.zones:
+        largest = np.array([_pressing(state)[zone.numbers].max(initial=0.0) for state in states])
+        presses = np.flatnonzero(largest > _RESIDUE * largest.max())
+        step = int(presses[-1]) if len(presses) else len(states) - 1
+        judged.setdefault(step, set()).add(zone.zone.name)
+    found = [_facets_of(problem, states[step], names) for step, names in judged.items()]
+    return FacetEffect(*np.max([FacetEffect(), *found], axis=0).tolist())
+
+
+def _pressing(state: Equilibrium) -> np.ndarray:
+    """The pressures (k,), zero where they are round-off."""
+    return np.where(state.pressure > state.trial.pressure_limit, state.pressure, 0.0)
+
+
+def _facets_of(problem: ContactProblem, state: Equilibrium, names: set[str]) -> FacetEffect:
+    """What facets do to the zones of these names in a state, its status kept.
 
     Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
     nodes. A pressure below its round-off limit counts as zero.
     """
     scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
-    presses = state.pressure > state.trial.pressure_limit
-    pushed = np.where(presses, state.pressure, 0.0) * problem.constraints.covered
+    pushed = _pressing(state) * problem.constraints.covered
     closing = _closing(problem, state, pushed)
     for zone in scene.zones:
         mine, missed = zone.numbers, _missed(scene, zone)
         if missed is None:
             continue
+        judged = zone.zone.name in names
         if not pushed[mine].any():
             met = zone.operator.covered > 0
             left, peak = state.gap[mine][met], float(missed.depth.max()) / _MEAN[1]
-            if (left > np.maximum(state.trial.gap_limit[mine][met], _FITS * peak)).all():
+            if judged and (left > np.maximum(state.trial.gap_limit[mine][met], _FITS * peak)).all():
                 depth = max(depth, peak / float(left.min(initial=np.inf)))
             continue
         gaps[mine] = missed.gap
-        if (closed_by := float(pushed[mine] @ closing[mine])) > 0:
+        closed_by = float(pushed[mine] @ closing[mine])
+        if judged and closed_by > 0:
             depth = max(depth, float(pushed[mine] @ missed.depth) / closed_by)
     closed = state.iterate.closed & problem.constraints.normal
     if not gaps[closed].any():
@@ -82,7 +106,7 @@ def facets_of(problem: ContactProblem, state: Equilibrium) -> FacetEffect:
     for zone in scene.zones:
         weight, mine = zone.operator.covered, zone.numbers
         size = weight @ state.pressure[mine] ** 2
-        if gaps[mine].any():
+        if gaps[mine].any() and zone.zone.name in names:
             shares.append(float(np.sqrt(weight @ change[mine] ** 2 / size)))
     return FacetEffect(max(shares), depth)
 
@@ -154,6 +178,7 @@ def _bend(points: np.ndarray, blocks: Sequence[FaceBlock]) -> _Bend:
         mean = normal[vertex]
         lean = ((mean - own) * arm).sum(axis=2) / square  # the curvature κ
         level = (mean * own).sum(axis=2) > _EDGE
+        lean[np.abs(mean - own).max(axis=2) <= FLAT] = 0.0
         inner = shared[vertex] > 1
         size = np.where(inner, np.where(level, np.abs(lean), 0.0), np.inf).min(axis=1)
         curved = np.where(np.isfinite(size), size, 0.0) * np.sign((lean * inner).sum(axis=1))

@@ -150,7 +150,7 @@ OF_PRESSURE = (
 
 def validity(problem: ContactProblem, states: Sequence[Equilibrium]) -> Validity:
     """How far the load steps are from what a solve takes for granted."""
-    scene, facets = problem.scene, facets_of(problem, states[-1])
+    scene, facets = problem.scene, facets_of(problem, states)
     solid, apart, found = meshed(scene), _apart(scene), []
     for state in states:
         moved, closed = state.displacement, state.status.closed

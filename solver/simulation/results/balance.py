@@ -8,7 +8,7 @@ from ...mechanics.fem.faces import face_integrals
 from ...mechanics.fem.supports import DEPENDENT
 from ...mechanics.linear.factor import factorise
 from ...mechanics.mortar.edge import Edges, contact_edges
-from ..equilibrium.accuracy import force_at_rest
+from ..equilibrium.rest import force_at_rest
 from ..equilibrium.state import Equilibrium
 from ..scene.scene import Scene, ZoneScene
 from .forces import Reaction, Resultants, RigidMotion

@@ -85,13 +85,24 @@ class Scalars:
     strain_energy: float | None = None
 
 
+def largest_of(found: Sequence[dict[str, float]]) -> dict[str, float]:
+    """The largest value of each name.
+
+    >>> largest_of([{"force": 0.1, "moment": 0.3}, {"force": 0.2}])
+    {'force': 0.2, 'moment': 0.3}
+    """
+    names = dict.fromkeys(name for one in found for name in one)
+    return {name: max(one.get(name, 0.0) for one in found) for name in names}
+
+
 @dataclass
 class Quality:
     """How good a solution is, by itself and where its case names an exact one.
 
     `balance` names relative imbalances (of forces and moments, relative to the load); `accuracy`
-    are the relative errors that rounding alone may cause, by cause (see `equilibrium.state`);
-    `errors` the norms of `solver.verification.norms`. `validity`: see there.
+    are the relative errors that rounding alone may cause, by cause (see `equilibrium.state`), both
+    the largest of all steps; `errors` the norms of `solver.verification.norms`. `validity`: see
+    there.
     """
 
     balance: dict[str, float] = field(default_factory=dict)

@@ -26,7 +26,7 @@ from .balance import (
 from .exact import pressure_on
 from .forces import ProbeResult, Resultants
 from .friction import with_friction, zone_friction
-from .records import Cost, Fields, Places, Quality, Scalars
+from .records import Cost, Fields, Places, Quality, Scalars, largest_of
 from .recovered import recovered_pressure
 from .solution import (
     BodyInfo,
@@ -86,7 +86,10 @@ def solution_of(problem: ContactProblem, states: list[Equilibrium], plan: list[L
             linear_iterations=problem.linear_iterations,
             matrix_entries=problem.matrix.nnz,
         ),
-        quality=Quality(balance=imbalances(scene, last), accuracy=last.accuracy.causes),
+        quality=Quality(
+            balance=largest_of([imbalances(scene, state) for state in states]),
+            accuracy=largest_of([state.accuracy.causes for state in states]),
+        ),
         places=Places(
             probed(scene, zones, last.displacement, stress) if scene.case.probes else {},
             scene.named.acted,

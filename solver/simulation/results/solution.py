@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...lac.cells.faces import FLAT
 from .forces import Reaction, Resultants, RigidMotion
 from .records import Cost, Fields, Places, Quality, Scalars
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from ...case.model import Case
     from ...lac.cells.faces import SurfacePoints
 
-# Normals that differ by less are those of a flat surface.
-_FLAT = 1e-9
 # The error of pressures is not known where it is not for so much of the square of their norm.
 _UNKNOWN = 1e-2
 
@@ -195,7 +194,7 @@ class ZoneResult:
     @property
     def flat(self) -> bool:
         """Whether all macro-elements have one normal, up to rounding."""
-        return bool((np.ptp(self.normal, axis=0) < _FLAT).all())
+        return bool((np.ptp(self.normal, axis=0) < FLAT).all())
 
     @property
     def shown_status(self) -> np.ndarray:

@@ -14,11 +14,12 @@ from ...case.file import Zone
 from ...case.model import Case
 from ...case.rules import check_dimension
 from ...lac.cells.catalogue import BY_MESHIO
+from ...lac.cells.faces import FLAT
 from ...system.errors import InputError, hint
 
 ALL = "all"
 # Nodes nearer to the axis than this share of the largest coordinate are on it.
-ON_AXIS = 1e-12
+ON_AXIS = FLAT
 _EMPTY = (
     "is empty, or none of its members touches a volume cell (a rigid line or surface is one of "
     "`bodies`)"
