@@ -14,6 +14,8 @@ from .samples import Reference, Sample, Sampler, by_component
 # stress that the displacement could cause, the law is judged by that share: forces are rounded on
 # their scale. Slips as well.
 _LITTLE, _LITTLE_OF_MOTION = 0.1, 1e-6
+# A coefficient below this one counts as it: tractions are rounded beside the pressure.
+_LITTLE_FRICTION = 1e-2
 # Slips shorter than this share of the model's length count as zero.
 _NO_WAY = 1e-10
 
@@ -22,8 +24,8 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     """By how much a zone breaks Coulomb's law: on each macro-element, and in each step.
 
     The traction t on the slave is at most μp, and 0 where open; what sticks has no slip w; what
-    slips has t |w| = μp w. Relative to the largest μp, to the largest slip, to their product. The
-    work of friction is not negative, relative to that of all steps.
+    slips has t |w| = μp w. Relative to the largest μp (μ at least 0.01), to the largest slip, to
+    their product. The work of friction is not negative, relative to that of all steps.
     """
     if zone.friction is None:
         return None
@@ -34,7 +36,7 @@ def friction_law(solution: Solution, zone: ZoneResult, _: Reference) -> Sample |
     bound, far = mu * zone.multiplier, np.linalg.norm(slip, axis=1)
     gone = np.linalg.norm(zone.friction.slip_total, axis=1)
     little = _little_pressure(solution)
-    largest = max(float(bound.max()), mu * little) or 1.0
+    largest = max(mu, _LITTLE_FRICTION) * max(float(zone.multiplier.max()), little) or 1.0
     farthest = max(float(far.max()), _LITTLE * float(gone.max())) or 1.0
     size = np.linalg.norm(traction, axis=1)
     apart = traction * far[:, None] - bound[:, None] * slip

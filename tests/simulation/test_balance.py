@@ -134,6 +134,14 @@ def test_springs_have_a_reaction_and_no_strain_energy():
     assert found.scalars.strain_energy == pytest.approx(0.284375)
 
 
+@pytest.mark.parametrize("stiffness", [1e6, 1e8, 1e10])
+def test_stiff_springs_are_drawn_by_the_last_digits_of_what_a_body_moves(stiffness):
+    change = ("{group: base, fix: [y]}", f"{{group: base, spring: {{normal: {stiffness}}}}}")
+    found = simulate(changed_case(2, change), block_mesh("QUAD4", "QUAD8", (3, 2)))
+    assert by_group(found)["springs"].force == pytest.approx([0, 25], abs=1e-9)
+    assert max(found.quality.balance.values()) < 1e-11
+
+
 def test_supports_that_are_not_at_right_angles_hold_the_load_together():
     """Sides that lean by 1 : 2; at their foot the base and the normal hold the same nodes."""
     mesh = block_mesh("QUAD4", "QUAD4", (3, 2))

@@ -62,6 +62,13 @@ def law(solution):
     return check.error
 
 
+@pytest.mark.parametrize("poisson", [0.3, 0.499])
+def test_the_smallest_coefficient_keeps_coulombs_law(poisson):
+    """Tractions of 1e-5 of the pressure are known to the rounding of the pressure."""
+    case = plate(1e-5, 0.05, n=40, change=lambda text: text.replace("0.3}", f"{poisson}}}"))
+    assert law(solved(case)) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("mu", "push"), [(0.3, 0.05), (1.0, 0.1), (1.0, 0.2), (2.0, 0.3), (5.0, 0.5)]
 )

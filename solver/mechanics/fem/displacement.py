@@ -46,17 +46,26 @@ class Displacement:
         """The displacement (n_dofs,) itself."""
         return self.motions @ self.amount + self.deformation.sum(axis=0)
 
+    def extended(self, seen: np.ndarray) -> np.ndarray:
+        """The displacement with all of its digits where `seen` (n_dofs,), zero elsewhere."""
+        found, moves = np.zeros(len(seen), dtype=Extended), self.motions[seen].tocoo()
+        found[seen] = self.deformation[:, seen].astype(Extended).sum(axis=0)
+        rigid = moves.data * self.amount.astype(Extended)[moves.col]
+        np.add.at(found, np.flatnonzero(seen)[moves.row], rigid)
+        return found
+
     def moved(self, change: np.ndarray) -> "Displacement":
         """This displacement with `change` (n_dofs,) added."""
-        more = self.fit @ change
+        amount = self.amount + self.fit @ change
         first, second = self.deformation
-        added = change - self.motions @ more
+        # What the amounts lose of a small change stays in the remainder.
+        added = change - self.motions @ (amount - self.amount)
         total = first + added
         # What the sum lost (Knuth, The Art of Computer Programming, vol. 2, §4.2.2).
         back = total - first
         lost = (first - (total - back)) + (added - back) if self.split else 0.0
         deformation = np.stack([total, second + lost])
-        return Displacement(self.motions, self.fit, self.amount + more, deformation, self.split)
+        return Displacement(self.motions, self.fit, amount, deformation, self.split)
 
     def opening(self, gaps: sparse.csr_matrix, dim: int, differences: bool = True) -> np.ndarray:
         """∫ gap (m,) that it opens, by the gap operator `gaps` (m, n_dofs), dofs dim · node + axis.
@@ -87,7 +96,5 @@ def _apart(
     other = dim * first[rows] + gaps.indices % dim
     seen = np.zeros(gaps.shape[1], dtype=bool)
     seen[gaps.indices] = seen[other] = True
-    whole = np.zeros(gaps.shape[1], dtype=Extended)
-    whole[seen] = displacement.deformation[:, seen].astype(Extended).sum(axis=0)
-    whole[seen] += (displacement.motions @ displacement.amount)[seen]
+    whole = displacement.extended(seen)
     return whole[gaps.indices] - whole[other]

@@ -24,19 +24,24 @@ class _SpringTerm(Term):
 
 
 class Springs(ModelPart):
-    """Springs of a stiffness (n_dofs, n_dofs), drawn by `drawn` (n, dim) beside displacements."""
+    """Springs of a stiffness (n_dofs, n_dofs), drawn by `drawn` (n, dim) beside displacements.
+
+    Stiff springs are drawn by next to nothing, the difference of what a body moves and deforms.
+    """
 
     holder = "springs"
 
     def __init__(self, stiffness: sparse.csr_matrix, drawn: np.ndarray):
         self.stiffness, self._drawn = stiffness, drawn
         self.diagonal = stiffness.diagonal()
+        self._held = np.diff(stiffness.indptr) > 0
         self.resisting = _rows(stiffness)
 
     def term(self, displacement: Displacement, inner: None) -> Term:  # noqa: ARG002
         """Their forces."""
-        drawn = displacement.total + self._drawn.ravel()
-        return _SpringTerm((self.stiffness @ drawn).reshape(self._drawn.shape))
+        drawn = displacement.extended(self._held) + self._drawn.ravel()
+        force = (self.stiffness @ drawn).astype(float)
+        return _SpringTerm(force.reshape(self._drawn.shape))
 
 
 def springs_of(groups: Attributes) -> Springs:
