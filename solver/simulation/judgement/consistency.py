@@ -17,8 +17,8 @@ from ..results.solution import Solution, ZoneResult
 
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by what so many roundings of displacements
-# are as stress, and by the last share of the largest of all steps, or as many errors of that as the
-# search for the status allows: what loads that are none leave.
+# and loads are as stress, by as many of its errors as the search for the status allows, and by the
+# last share of the zone's largest of all steps: what loads that are gone leave.
 _TOLERANCE, _ROUNDINGS, _OF_ALL = 1e-8, 1e3, 1e-9
 # What is not known everywhere, or not yet, and what is no number.
 _MAY_BE_NAN = {
@@ -75,8 +75,10 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     dim = 3 if solution.case.axisymmetric else moved.shape[1]
     smallest = float(zone.area.min()) ** (1 / (dim - 1))
     error = round_off * young * float(np.abs(solution.displacement).max()) / smallest
-    known = max(_OF_ALL, ERRORS * max(solution.quality.accuracy.values(), default=0.0))
-    error += known * solution.largest_pressure
+    known = ERRORS * max(solution.quality.accuracy.values(), default=0.0)
+    error += (known + round_off) * solution.largest_pressure
+    borne = [s.resultants[zone.name].pressure for s in solution.steps if zone.name in s.resultants]
+    error += _OF_ALL * max((float(each.max()) for each in borne if each is not None), default=0.0)
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"
