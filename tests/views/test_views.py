@@ -76,7 +76,7 @@ def by_rounding(true):
 
 
 def _known(state):
-    trial = replace(state.trial, pressure_limit=0 * state.trial.pressure_limit)
+    trial = replace(state.trial, pressure_limit=np.zeros_like(state.pressure))
     return replace(state, trial=trial)
 
 
