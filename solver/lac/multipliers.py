@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
+from .cells.faces import FLAT
 from .cells.shape import face_rule
 from .facets import Facets, measured
 from .partners import Samples
@@ -104,8 +105,6 @@ def constants(data: InterfaceData) -> Multipliers:
 
 # A face counts as fully covered when the segments miss less than this share of its area.
 _FULL = 1e-11
-# Normals that differ by less are one normal.
-_ONE_NORMAL = 1e-9
 SLAVE, MASTER = 0, 1
 
 
@@ -193,7 +192,7 @@ def _close_block(parts: Sequence[Integrals], side: int) -> tuple[list[Integrals]
     exact = shape_integrals(block) * cosine[:, None]
     whole = exact.sum(axis=1)
     full = block.flat & (area > 0) & (np.abs(area - whole) <= _FULL * whole)
-    full &= (highest - lowest <= _ONE_NORMAL).all(axis=1)
+    full &= (highest - lowest <= FLAT).all(axis=1)
     defect = np.where(full[:, None], exact - summed, 0.0)
     changed = []
     for part in parts:

@@ -10,13 +10,12 @@ from typing import Self
 import numpy as np
 
 from .cells.catalogue import CellType
+from .cells.faces import FLAT
 from .clipping import clip, triangles
 from .facets import Facets, project_along
 
 # Master faces overlap, one behind the other, by more than this share of the slave face's radius.
 _OVERLAP = 1e-9
-# Master faces whose corners lie in one plane, to this share of their extent, hide nothing.
-_ONE_PLANE = 1e-9
 # More than what rounding makes of a distance, as a share of it.
 _ROUNDING = 1e-9
 # Balls around faces, seen along a normal, are taken as larger by this factor.
@@ -371,11 +370,12 @@ def hidden_pairs(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _in_one_plane(outline: Outlines) -> bool:
+    """Whether master faces lie in one plane, where none hides another."""
     points = outline.corner.reshape(-1, outline.corner.shape[2])
     offset = points - points.mean(axis=0)
     size = np.abs(offset).max()
-    flat = np.abs(offset @ outline.normal[0]).max() <= _ONE_PLANE * size
-    return bool(flat and np.abs(outline.bulge @ outline.normal[0]).max() <= _ONE_PLANE * size)
+    flat = np.abs(offset @ outline.normal[0]).max() <= FLAT * size
+    return bool(flat and np.abs(outline.bulge @ outline.normal[0]).max() <= FLAT * size)
 
 
 def _shared(own: np.ndarray, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -215,6 +215,18 @@ def _filled(which: np.ndarray, regions: Regions) -> tuple[np.ndarray, Regions]:
     return which[some], regions.of(some)
 
 
+def edge_bends(corner: np.ndarray, bulge: np.ndarray) -> np.ndarray:
+    """Which edges (n, v) of faces are bent: 1 inward, −1 outward, 0 straight (see `FLAT`).
+
+    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    >>> edge_bends(square, np.array([[[0.0, 0.1], [0.1, 0.0], [0.1, 0.0], [0.0, 0.0]]])).tolist()
+    [[1.0, -1.0, 0.0, 0.0]]
+    """
+    chord = np.roll(corner, -1, axis=1) - corner
+    sideways = _cross(chord, bulge)
+    return np.where(np.abs(sideways) > FLAT * (chord**2).sum(axis=2), np.sign(sideways), 0.0)
+
+
 def _boundary(
     corner: np.ndarray, bulge: np.ndarray
 ) -> tuple[list[Curves], list[tuple[np.ndarray, list[Curves]]]]:
@@ -222,9 +234,8 @@ def _boundary(
 
     A cap lies between an edge bent outward and its chord; which faces (m,) have it comes with it.
     """
-    chord = np.roll(corner, -1, axis=1) - corner
-    sideways = _cross(chord, bulge)
-    bent = np.abs(sideways) > FLAT * (chord**2).sum(axis=2)
+    chord, bends = np.roll(corner, -1, axis=1) - corner, edge_bends(corner, bulge)
+    bent = bends != 0
     lines, dents, caps = [], [], []
     for k in range(corner.shape[1]):
         line = Curves(origin=corner[:, k], along=chord[:, k], idle=~chord[:, k].any(axis=1))
@@ -238,7 +249,7 @@ def _boundary(
             idle=~bent[:, k],
         )
         lines.append(line)
-        inward = bent[:, k] & (sideways[:, k] > 0)
+        inward = bends[:, k] > 0
         if inward.any():
             dents.append(replace(parabola, inside=False, idle=~inward))
         rows = np.flatnonzero(bent[:, k] & ~inward)

@@ -20,7 +20,7 @@ from typing import Self
 
 import numpy as np
 
-from .cells.faces import FLAT, circumference
+from .cells.faces import circumference
 from .cells.shape import invert, shape_functions, simplex_rule
 from .clipping import Image, Pieces, clip, overlap, quadrature
 from .facets import Facets, project_along
@@ -35,6 +35,7 @@ from .regions import (
     Parts,
     Regions,
     clip_to_face,
+    edge_bends,
     joined,
     without_face,
 )
@@ -174,13 +175,6 @@ def _among(behind: Behind, chosen: np.ndarray, count: int) -> Behind:
     return number[behind[0][kept]], behind[1][kept]
 
 
-def _looks_straight(corner: np.ndarray, bulge: np.ndarray) -> np.ndarray:
-    """Which outlines (p,) have straight edges only: whose middles are off the chord by no more."""
-    chord = np.roll(corner, -1, axis=1) - corner
-    sideways = chord[..., 0] * bulge[..., 1] - chord[..., 1] * bulge[..., 0]
-    return (np.abs(sideways) <= FLAT * (chord**2).sum(axis=2)).all(axis=1)
-
-
 def _degree(pairs: Pairs) -> int:
     kinds = [pairs.slave.type, *(block.type for block in pairs.masters)]
     degree = max(kind.degree for kind in kinds)
@@ -195,7 +189,8 @@ def _areas(pairs: Pairs, behind: Behind, degree: int, curved: bool) -> list[Piec
     """Pieces of what faces have in common: in the slave's plane, or where `curved` in reference."""
     window, bend = pairs.seen(pairs.own, pairs.i)
     subject, bulge = pairs.seen(pairs.outline, pairs.j)
-    special = ~(_looks_straight(window, bend) & _looks_straight(subject, bulge))
+    bends = np.hstack([edge_bends(window, bend), edge_bends(subject, bulge)])
+    special = np.asarray(bends.any(axis=1))
     special[behind[0]] = True
     which = np.flatnonzero(~special)
     corner, count = clip(subject[which], np.full(len(which), subject.shape[1]), window[which])

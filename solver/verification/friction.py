@@ -14,7 +14,8 @@ from .samples import Reference, Sample, Sampler, by_component
 # stress that the displacement could cause, the law is judged by that share: forces are rounded on
 # their scale. Slips as well.
 _LITTLE, _LITTLE_OF_MOTION = 0.1, 1e-6
-# A coefficient below this one counts as it: tractions are rounded beside the pressure.
+# Smaller coefficients are judged as if they were this one: rounding of the tractions scales with
+# the pressure.
 _LITTLE_FRICTION = 1e-2
 # Slips shorter than this share of the model's length count as zero.
 _NO_WAY = 1e-10

@@ -50,8 +50,8 @@ class Displacement:
         """The displacement with all of its digits where `seen` (n_dofs,), zero elsewhere."""
         found, moves = np.zeros(len(seen), dtype=Extended), self.motions[seen].tocoo()
         found[seen] = self.deformation[:, seen].astype(Extended).sum(axis=0)
-        rigid = moves.data * self.amount.astype(Extended)[moves.col]
-        np.add.at(found, np.flatnonzero(seen)[moves.row], rigid)
+        carried = moves.data * self.amount.astype(Extended)[moves.col]
+        np.add.at(found, np.flatnonzero(seen)[moves.row], carried)
         return found
 
     def moved(self, change: np.ndarray) -> "Displacement":

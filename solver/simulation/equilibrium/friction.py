@@ -19,7 +19,7 @@ from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
 from .contacts import Contacts
 from .problem import ContactProblem
-from .rest import AT_REST, forces_at_work
+from .rest import AT_REST, FAINT, forces_at_work
 from .state import Equilibrium, Friction
 
 _LOG = logging.getLogger(__name__)
@@ -27,8 +27,6 @@ _LOG = logging.getLogger(__name__)
 # those of a state on the way; they end as well where it falls by less than the half. A larger fault
 # than the last one is no state.
 _CORRECTIONS, _EXACT, _ON_THE_WAY, _SLOW, _TOLERATED = 6, 1e-15, 1e-12, 0.5, 1e-6
-# A contact that rounding alone may press bears less than this share of the forces at work.
-_FAINT = 1e-9
 # So often the status is found anew where it changes how contact gives way.
 _ROUNDS = 8
 _UNHELD = (
@@ -100,7 +98,7 @@ class Search:
 
         scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
         enough = _ON_THE_WAY if on_the_way else _EXACT
-        for nothing in (AT_REST, _FAINT):
+        for nothing in (AT_REST, FAINT):
             solution = contact.solve(at_rest, gone, last, at_work, nothing * at_work, rest)
             if solution is None:
                 break
@@ -111,7 +109,7 @@ class Search:
                 found = self._freed(forces, z, correction) or found
                 state = self._with_status(found, *contact.statuses(forces, z))
                 return state if on_the_way else self._judged(found, state)
-            if contact.faintest(forces) > _FAINT * at_work:
+            if contact.faintest(forces) > FAINT * at_work:
                 break
         return self._resting(at_work, correction)
 

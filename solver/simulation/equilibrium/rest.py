@@ -8,23 +8,25 @@ from .iterate import ContactIterate
 
 AT_REST = 1e-12
 """Forces below this share of the loads of all steps are none."""
-# The same where meshes do not fit to the last digit, and the share of stresses and motions.
-_FAINT, _LITTLE = 1e-9, 1e-4
+FAINT = 1e-9
+"""The same where coordinates are rounded, so that surfaces in contact do not fit exactly."""
+LITTLE = 1e-4
+"""Pressures, stresses and motions below this share of those in other steps count as zero."""
 
 
 def rests(iterate: ContactIterate) -> bool:
     """Whether no force acts, and stresses and motions are nothing beside those of other steps.
 
-    What is left is what rounded meshes do not fit by.
+    Anything left comes from rounded coordinates.
     """
     scene, moves = iterate.scene, iterate.displacement.total
     work = scene.loads.at_work
     force, moved = float(np.abs(iterate.force).max()), float(np.abs(moves).max())
-    if not (work.force or work.motion) or force > _FAINT * forces_at_work(scene, moves):
+    if not (work.force or work.motion) or force > FAINT * forces_at_work(scene, moves):
         return False
     caused = max(stress_at_rest(scene, moves), work.total / _section(scene))
-    still = moved <= _LITTLE * (work.motion or np.inf)
-    return still and iterate.sizes.highest <= _LITTLE * caused
+    still = moved <= LITTLE * (work.motion or np.inf)
+    return still and iterate.sizes.highest <= LITTLE * caused
 
 
 def forces_of_others(iterate: ContactIterate) -> float:

@@ -18,7 +18,7 @@ from ..results.solution import Solution, ZoneResult
 # A pressure or gap may be negative by this share of its zone's scale; a gap also by so many
 # roundings of coordinates and displacements, a pressure by what so many roundings of displacements
 # and loads are as stress, by as many of its errors as the search for the status allows, and by the
-# last share of the zone's largest of all steps: what loads that are gone leave.
+# last share of the zone's largest pressure in any step, since earlier loads leave a residue.
 _TOLERANCE, _ROUNDINGS, _OF_ALL = 1e-8, 1e3, 1e-9
 # What is not known everywhere, or not yet, and what is no number.
 _MAY_BE_NAN = {
@@ -77,8 +77,7 @@ def _status(zone: ZoneResult, solution: Solution) -> Iterator[str]:
     error = round_off * young * float(np.abs(solution.displacement).max()) / smallest
     known = ERRORS * max(solution.quality.accuracy.values(), default=0.0)
     error += (known + round_off) * solution.largest_pressure
-    borne = [s.resultants[zone.name].pressure for s in solution.steps if zone.name in s.resultants]
-    error += _OF_ALL * max((float(each.max()) for each in borne if each is not None), default=0.0)
+    error += _OF_ALL * solution.largest_in(zone.name)
     worst = float(contact.multiplier.min(initial=0.0))
     if worst < -_TOLERANCE * scale - error:
         yield f"zone {zone.name}: contact bears tension, a pressure of {worst:.3g}"

@@ -19,14 +19,13 @@ from scipy.spatial import cKDTree
 from ...lac.cells.faces import FLAT, FaceBlock, area_vectors, surface_normals
 from ...lac.cells.shape import shape_functions
 from ..equilibrium.problem import ContactProblem
+from ..equilibrium.rest import LITTLE
 from ..equilibrium.state import Equilibrium
 from ..results.balance import strain_energy, work_of_forces
 from ..scene.scene import Scene, ZoneScene
 
 # A vertex whose mean normal leans by more against a face's own is on an edge of the body.
 _EDGE = np.cos(np.radians(25))
-# A pressure below this share of the zone's largest of all steps is none.
-_RESIDUE = 1e-4
 # Gaps of mesh and case agree where they differ by less than this share of what facets may miss;
 # bodies whose gap is smaller touch.
 _FITS = 1e-3
@@ -42,8 +41,15 @@ class _Bend(NamedTuple):
     rise: np.ndarray
 
 
+class _Missed(NamedTuple):
+    """By macro-element (m,): what facets add to a gap, a mean over neighbours, and their depth."""
+
+    gap: np.ndarray
+    depth: np.ndarray
+
+
 class FacetEffect(NamedTuple):
-    """What facets do, the most of all zones and steps; zero without any.
+    """What facets do to a zone, or the most that they do to any; zero without facets.
 
     `pressure`: the L2 change of a zone's pressure by the gap that facets add on the average, over
     the pressure; `depth`: how far facets miss their surfaces, over the elastic closing of the
@@ -57,16 +63,16 @@ class FacetEffect(NamedTuple):
 def facets_of(problem: ContactProblem, states: Sequence[Equilibrium]) -> FacetEffect:
     """What facets do to each zone in the last step that presses it, or in the last of all.
 
-    A pressure that is next to nothing beside those of other steps is what a rounded mesh does not
-    fit by.
+    A pressure far below those of other steps comes from rounded coordinates and is not judged.
     """
-    judged: dict[int, set[str]] = {}
-    for zone in problem.scene.zones:
+    zones, steps = problem.scene.zones, []
+    for zone in zones:
         largest = np.array([_pressing(state)[zone.numbers].max(initial=0.0) for state in states])
-        presses = np.flatnonzero(largest > _RESIDUE * largest.max())
-        step = int(presses[-1]) if len(presses) else len(states) - 1
-        judged.setdefault(step, set()).add(zone.zone.name)
-    found = [_facets_of(problem, states[step], names) for step, names in judged.items()]
+        presses = np.flatnonzero(largest > LITTLE * largest.max())
+        steps.append(int(presses[-1]) if len(presses) else len(states) - 1)
+    missed = [_missed(problem.scene, zone) for zone in zones]
+    by_step = {step: _facets_in(problem, states[step], missed) for step in set(steps)}
+    found = [by_step[step][number] for number, step in enumerate(steps)]
     return FacetEffect(*np.max([FacetEffect(), *found], axis=0).tolist())
 
 
@@ -75,40 +81,38 @@ def _pressing(state: Equilibrium) -> np.ndarray:
     return np.where(state.pressure > state.trial.pressure_limit, state.pressure, 0.0)
 
 
-def _facets_of(problem: ContactProblem, state: Equilibrium, names: set[str]) -> FacetEffect:
-    """What facets do to the zones of these names in a state, its status kept.
+def _facets_in(
+    problem: ContactProblem, state: Equilibrium, missed: Sequence[_Missed | None]
+) -> list[FacetEffect]:
+    """What facets do to each zone in a state with its status kept; `missed` is by zone.
 
-    Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
-    nodes. A pressure below its round-off limit counts as zero.
+    A pressure below its round-off limit counts as zero.
     """
-    scene, gaps, depth = problem.scene, np.zeros(len(state.pressure)), 0.0
+    gaps, depths = np.zeros(len(state.pressure)), []
     pushed = _pressing(state) * problem.constraints.covered
     closing = _closing(problem, state, pushed)
-    for zone in scene.zones:
-        mine, missed = zone.numbers, _missed(scene, zone)
-        if missed is None:
-            continue
-        judged = zone.zone.name in names
-        if not pushed[mine].any():
+    for zone, miss in zip(problem.scene.zones, missed, strict=True):
+        mine, depth = zone.numbers, 0.0
+        if miss is not None and pushed[mine].any():
+            gaps[mine] = miss.gap
+            if (closed_by := float(pushed[mine] @ closing[mine])) > 0:
+                depth = float(pushed[mine] @ miss.depth) / closed_by
+        elif miss is not None:
             met = zone.operator.covered > 0
-            left, peak = state.gap[mine][met], float(missed.depth.max()) / _MEAN[1]
-            if judged and (left > np.maximum(state.trial.gap_limit[mine][met], _FITS * peak)).all():
-                depth = max(depth, peak / float(left.min(initial=np.inf)))
-            continue
-        gaps[mine] = missed.gap
-        closed_by = float(pushed[mine] @ closing[mine])
-        if judged and closed_by > 0:
-            depth = max(depth, float(pushed[mine] @ missed.depth) / closed_by)
+            left, peak = state.gap[mine][met], float(miss.depth.max()) / _MEAN[1]
+            if (left > np.maximum(state.trial.gap_limit[mine][met], _FITS * peak)).all():
+                depth = peak / float(left.min(initial=np.inf))
+        depths.append(depth)
     closed = state.iterate.closed & problem.constraints.normal
-    if not gaps[closed].any():
-        return FacetEffect(0.0, depth)
-    change, shares = problem.pressure_of_gaps(closed, gaps), [0.0]
-    for zone in scene.zones:
-        weight, mine = zone.operator.covered, zone.numbers
-        size = weight @ state.pressure[mine] ** 2
-        if gaps[mine].any() and zone.zone.name in names:
-            shares.append(float(np.sqrt(weight @ change[mine] ** 2 / size)))
-    return FacetEffect(max(shares), depth)
+    change = problem.pressure_of_gaps(closed, gaps) if gaps[closed].any() else 0.0 * gaps
+    found = []
+    for zone, depth in zip(problem.scene.zones, depths, strict=True):
+        weight, mine, share = zone.operator.covered, zone.numbers, 0.0
+        if gaps[mine].any():
+            size = weight @ state.pressure[mine] ** 2
+            share = float(np.sqrt(weight @ change[mine] ** 2 / size))
+        found.append(FacetEffect(share, depth))
+    return found
 
 
 def _closing(problem: ContactProblem, state: Equilibrium, pushed: np.ndarray) -> np.ndarray:
@@ -131,15 +135,12 @@ def _closing(problem: ContactProblem, state: Equilibrium, pushed: np.ndarray) ->
     return found
 
 
-class _Missed(NamedTuple):
-    """By macro-element (m,): what facets add to a gap, a mean over neighbours, and their depth."""
-
-    gap: np.ndarray
-    depth: np.ndarray
-
-
 def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
-    """What the facets of a zone miss; None where they miss nothing, or both sides the same."""
+    """What the facets of a zone miss; None where they miss nothing, or both sides the same.
+
+    Zones with a given gap have none, nor have rigid surfaces without a mesh and multipliers at
+    nodes.
+    """
     operator = zone.operator
     if zone.zone.clearance is not None or operator.nodes is not None or not zone.master_faces:
         return None

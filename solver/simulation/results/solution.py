@@ -347,9 +347,14 @@ class Solution:
     @property
     def largest_pressure(self) -> float:
         """The largest pressure of any step, of loads or contact: where nothing acts, the scale."""
-        found = [one.pressure for step in self.steps for one in step.resultants.values()]
-        of_contact = (float(each.max()) for each in found if each is not None)
+        of_contact = (self.largest_in(zone.name) for zone in self.zones)
         return max(self.scalars.load_scale, *of_contact, 0.0)
+
+    def largest_in(self, zone: str) -> float:
+        """The largest contact pressure of a zone in any step."""
+        found = (step.resultants.get(zone) for step in self.steps)
+        known = (one.pressure for one in found if one and one.pressure is not None)
+        return max((float(each.max()) for each in known), default=0.0)
 
     @property
     def largest_displacement(self) -> tuple[float, np.ndarray]:

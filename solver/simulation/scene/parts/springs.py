@@ -26,7 +26,7 @@ class _SpringTerm(Term):
 class Springs(ModelPart):
     """Springs of a stiffness (n_dofs, n_dofs), drawn by `drawn` (n, dim) beside displacements.
 
-    Stiff springs are drawn by next to nothing, the difference of what a body moves and deforms.
+    A stiff spring stretches by a tiny difference between two displacements: it needs all digits.
     """
 
     holder = "springs"
