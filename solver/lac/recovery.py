@@ -16,6 +16,7 @@ D. G. Anderson, J. ACM 12 (1965) 547–560, for the combination.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -122,8 +123,16 @@ class Recovery:
     levers: np.ndarray | None = None
 
     def reconstruction(self, closed: np.ndarray) -> Reconstruction:
-        """The reconstruction among closed macro-elements (m,)."""
-        return reconstruct(self.moments, self.near, closed, self.form)
+        """The reconstruction among closed macro-elements (m,); the last two stay known."""
+        return self._among(closed.tobytes())
+
+    @cached_property
+    def _among(self) -> Callable[[bytes], Reconstruction]:
+        # Sweeps ask for the same ones again: among what is closed, and among what sticks.
+        moments, near, form = self.moments, self.near, self.form
+        return lru_cache(2)(
+            lambda closed: reconstruct(moments, near, np.frombuffer(closed, dtype=bool), form)
+        )
 
     def error(self, coefficients: np.ndarray, fit: Reconstruction) -> np.ndarray:
         """η (m,), the L2 norm of p* − p on each, for `coefficients` (m · k,).

@@ -5,8 +5,9 @@ reproduce. Any node of any tool's reference cell has its place by that map, so t
 nothing of the project's own node orders; and the volume is the integral of a polynomial.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import factorial
 
 import numpy as np
@@ -29,7 +30,9 @@ class Curved:
     cell: CellType
 
     @classmethod
+    @cache
     def of(cls, name: str) -> "Curved":
+        """The curved cell of a type, one for all that ask."""
         return cls(BY_NAME[name])
 
     @cached_property
@@ -50,9 +53,14 @@ class Curved:
     def places(self, reference: np.ndarray) -> np.ndarray:
         """Where the map puts points (n, dim) of the catalogue's reference cell: (n, 3)."""
         columns = [*np.asarray(reference, float).T, 0, 0]
-        values = [sympy.lambdify((x, y, z), e)(*columns[:3]) for e in self.expressions]
-        values += [np.zeros(len(reference))] * (3 - self.cell.dim)
-        return np.stack(values, axis=1)
+        found = np.zeros((len(reference), 3))
+        for axis, value in enumerate(self._functions(*columns[:3])):
+            found[:, axis] = value
+        return found
+
+    @cached_property
+    def _functions(self) -> Callable:
+        return sympy.lambdify((x, y, z), self.expressions)
 
     @cached_property
     def volume(self) -> float:

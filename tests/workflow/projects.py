@@ -47,7 +47,7 @@ for line in sys.stdin:
         os.environ.update(environment)
         os.chdir(folder)
         sys.argv[1:] = arguments
-        runpy.run_module("snakemake", run_name="__main__", alter_sys=True)
+        runpy.run_path("workflow/start.py", run_name="__main__")
     print(os.waitstatus_to_exitcode(os.waitpid(run, 0)[1]), flush=True)
 """
 
@@ -79,7 +79,7 @@ def copy_program(folder):
     folder.mkdir(exist_ok=True)
     shutil.copy(ROOT / "Snakefile", folder)
     for name in ("workflow", "profiles", "solver"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, folder / name)
 
 
 def new_project(folder):

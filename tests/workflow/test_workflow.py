@@ -188,7 +188,7 @@ def test_a_wrong_setting_is_refused(solved, setting, message):
 
 def test_a_second_run_is_refused_while_one_lives_and_after_its_kill_it_works(tmp_path):
     project = new_project(tmp_path / "killed")
-    command = [sys.executable, "-m", "snakemake"]
+    command = [sys.executable, "workflow/start.py"]
     with (tmp_path / "output").open("w") as output:
         run = subprocess.Popen(
             command, cwd=project, stdout=output, stderr=output, start_new_session=True

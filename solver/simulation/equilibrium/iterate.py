@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from ...mechanics.fem.displacement import Displacement
 from ...mechanics.fem.elasticity import internal_force, stiffness
@@ -73,11 +72,14 @@ class ContactIterate:
         """The average gap (k,); zero for multipliers that are out of contact."""
         known = self.constraints.eligible | self.constraints.unloaded
         covered = np.where(known, self.constraints.covered, np.inf)
-        return (self.constraints.initial + self._opening(self.constraints.gaps)) / covered
+        return self._integrals / covered
 
-    def _opening(self, gaps: sparse.csr_matrix) -> np.ndarray:
-        dim = self.scene.points.shape[1]
-        return self.displacement.opening(gaps, dim, self.scene.options.safeguards.differences)
+    @cached_property
+    def _integrals(self) -> np.ndarray:
+        """∫ gap (k,)."""
+        dim, differences = self.scene.points.shape[1], self.scene.options.safeguards.differences
+        opened = self.displacement.opening(self.constraints.gaps, dim, differences)
+        return self.constraints.initial + opened
 
     @cached_property
     def opening_size(self) -> np.ndarray:
@@ -99,8 +101,7 @@ class ContactIterate:
 
     def violation(self) -> np.ndarray:
         """By how much ∫ gap of the closed multipliers is below zero."""
-        gaps, initial = self.constraints.gaps[self.closed], self.constraints.initial[self.closed]
-        return -(initial + self._opening(gaps))
+        return -self._integrals[self.closed]
 
     def advanced(self, change: np.ndarray) -> "ContactIterate":
         """The iterate with the free unknowns changed by `change` (n_free,)."""
