@@ -41,7 +41,8 @@ class ContactConstraints:
     `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
     move nothing; `own` (n_free,) marks the free unknowns of slave nodes, `moving` (k, n_dofs) has
     the coefficients of `gaps` on what supports leave free there. `normal` (k,): not of slip;
-    `unloaded` (k,): see `Unloaded`.
+    `measured` (k,): the initial gap has a part that is known as well as coordinates are, or there
+    is a slip; `unloaded` (k,): see `Unloaded`.
     """
 
     gaps: sparse.csr_matrix
@@ -54,6 +55,7 @@ class ContactConstraints:
     moving: sparse.csr_matrix
     own: np.ndarray
     normal: np.ndarray
+    measured: np.ndarray
     unloaded: np.ndarray
 
     @property
@@ -63,7 +65,9 @@ class ContactConstraints:
 
     def with_jumps(self, jump: np.ndarray) -> "ContactConstraints":
         """Those of which closed ones keep the mean gap or slip `jump` (k,)."""
-        return replace(self, initial=self.initial - self.covered * jump)
+        initial = self.initial - self.covered * jump
+        measured = np.where(self.normal, self.measured, initial != 0)
+        return replace(self, initial=initial, measured=measured)
 
     @cached_property
     def dependent(self) -> np.ndarray:
@@ -91,6 +95,10 @@ def contact_constraints(scene: Scene, carried: np.ndarray | None = None) -> Cont
     )
     normal = np.arange(len(area)) < scene.n_multipliers
     initial = np.where(normal, initial, 0.0 if carried is None else gaps @ carried)
+    measured = initial != 0
+    measured[normal] = np.concatenate(
+        [np.empty(0, bool), *(zone.meshed_apart for zone in scene.zones)]
+    )
     unloaded = np.zeros(len(area), dtype=bool)
     unloaded[normal] = scene.rest.unloaded_multipliers
     touching = covered / area > MIN_COVERAGE
@@ -116,6 +124,7 @@ def contact_constraints(scene: Scene, carried: np.ndarray | None = None) -> Cont
         moving=moving,
         own=np.asarray(abs(scene.free.basis).T @ slave.astype(float)) > 0,
         normal=normal,
+        measured=measured,
         unloaded=unloaded,
     )
 

@@ -70,6 +70,13 @@ class ZoneScene:
         """The multipliers, then the rows of slip by tangent."""
         return self.numbers, *self.slips
 
+    @property
+    def meshed_apart(self) -> np.ndarray:
+        """Where (k,) the initial gap has a part that is measured on the mesh."""
+        given = -self.zone.interference * self.operator.covered
+        measured = self.operator.initial != given
+        return measured if self.zone.clearance is None else np.zeros_like(measured)
+
     @cached_property
     def near(self) -> sparse.csr_matrix:
         """Pairs (m, m) of macro-elements that share a vertex."""
