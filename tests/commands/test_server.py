@@ -33,8 +33,7 @@ ONE_THREAD = {**os.environ, "OMP_NUM_THREADS": "1"}
 def folder(tmp_path_factory):
     """A folder with the solver in it and a case."""
     folder = tmp_path_factory.mktemp("warm")
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(ROOT / "solver", folder / "solver", ignore=ignored)
+    shutil.copytree(ROOT / "solver", folder / "solver")
     subprocess.run([sys.executable, "-m", "solver", "new", "good"], cwd=folder, check=True)
     main = folder / "solver" / "__main__.py"
     main.write_text(FAULTS + main.read_text())

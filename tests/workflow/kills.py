@@ -23,10 +23,9 @@ from pathlib import Path
 import h5py
 
 from tests.arguments import whole
-from tests.workflow.projects import new_project, without_times
+from tests.workflow.projects import SNAKEMAKE, new_project, without_times
 
 PYTHON = [sys.executable, "-m"]
-SNAKEMAKE = [sys.executable, "workflow/start.py", "--cores", "2"]  # as `make` does
 CASE, FOLDER = "cases/tiny/tiny-a.yaml", "results/tiny/tiny-a"
 MESH = "results/meshes/tiny/tiny-a/mesh.vtkhdf"
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)

@@ -23,6 +23,8 @@ contact: [{{name: interface, slave: bottom_contact, master: top_contact}}]
 directions: {directions}
 reference: {{kind: analytical, contact_pressure: {pressure}, gap: 0.0}}
 """
+# As `make` starts it.
+SNAKEMAKE = [sys.executable, "workflow/start.py", "--cores", "2"]
 
 
 def write_case(folder, name, directions="first", pressure=25.0):
@@ -65,6 +67,13 @@ def snakemake(project, *arguments):
         print(json.dumps(told), file=_forks().stdin, flush=True)
         status = int(_forks().stdout.readline())
         return subprocess.CompletedProcess(told[3:], status, output.read())
+
+
+def started(project, output):
+    """A run that can be struck with all of its processes; it writes into an open file."""
+    return subprocess.Popen(
+        SNAKEMAKE, cwd=project, stdout=output, stderr=output, start_new_session=True
+    )
 
 
 def jobs(project, *arguments):

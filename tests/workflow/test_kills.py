@@ -12,8 +12,8 @@ import time
 
 import pytest
 
-from tests.workflow.kills import SNAKEMAKE, kill_at_random
-from tests.workflow.projects import ROOT, new_project
+from tests.workflow.kills import kill_at_random
+from tests.workflow.projects import ROOT, new_project, started
 
 
 def test_what_is_killed_recovers(tmp_path):
@@ -30,9 +30,7 @@ def test_ctrl_c_leaves_no_verdict_and_nothing_runs_on(tmp_path):
     case.write_text(long)
     log = project / "results" / "tiny" / "tiny-a" / "log"
     with (tmp_path / "output").open("w") as output:
-        run = subprocess.Popen(
-            SNAKEMAKE, cwd=project, stdout=output, stderr=output, start_new_session=True
-        )
+        run = started(project, output)
         while not (log.exists() and "assembly" in log.read_text()):
             assert run.poll() is None, (tmp_path / "output").read_text()
             time.sleep(0.05)

@@ -11,7 +11,15 @@ import time
 
 import pytest
 
-from tests.workflow.projects import ROOT, jobs, new_project, snakemake, summary, write_case
+from tests.workflow.projects import (
+    ROOT,
+    jobs,
+    new_project,
+    snakemake,
+    started,
+    summary,
+    write_case,
+)
 
 
 @pytest.fixture(scope="module")
@@ -188,11 +196,8 @@ def test_a_wrong_setting_is_refused(solved, setting, message):
 
 def test_a_second_run_is_refused_while_one_lives_and_after_its_kill_it_works(tmp_path):
     project = new_project(tmp_path / "killed")
-    command = [sys.executable, "workflow/start.py"]
     with (tmp_path / "output").open("w") as output:
-        run = subprocess.Popen(
-            command, cwd=project, stdout=output, stderr=output, start_new_session=True
-        )
+        run = started(project, output)
         while not list(project.glob("results/tiny/*/log")):
             assert run.poll() is None
             time.sleep(0.02)

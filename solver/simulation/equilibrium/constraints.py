@@ -41,8 +41,8 @@ class ContactConstraints:
     `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
     move nothing; `own` (n_free,) marks the free unknowns of slave nodes, `moving` (k, n_dofs) has
     the coefficients of `gaps` on what supports leave free there. `normal` (k,): not of slip;
-    `measured` (k,): the initial gap has a part that is known as well as coordinates are, or there
-    is a slip; `unloaded` (k,): see `Unloaded`.
+    `measured` (k,): initial gaps with a part that is measured on the mesh; `unloaded` (k,): see
+    `Unloaded`.
     """
 
     gaps: sparse.csr_matrix
@@ -65,9 +65,12 @@ class ContactConstraints:
 
     def with_jumps(self, jump: np.ndarray) -> "ContactConstraints":
         """Those of which closed ones keep the mean gap or slip `jump` (k,)."""
-        initial = self.initial - self.covered * jump
-        measured = np.where(self.normal, self.measured, initial != 0)
-        return replace(self, initial=initial, measured=measured)
+        return replace(self, initial=self.initial - self.covered * jump)
+
+    @property
+    def rounded(self) -> np.ndarray:
+        """Where (k,) `initial` is known only as well as coordinates are: measured gaps, slips."""
+        return np.where(self.normal, self.measured, self.initial != 0)
 
     @cached_property
     def dependent(self) -> np.ndarray:
@@ -95,11 +98,9 @@ def contact_constraints(scene: Scene, carried: np.ndarray | None = None) -> Cont
     )
     normal = np.arange(len(area)) < scene.n_multipliers
     initial = np.where(normal, initial, 0.0 if carried is None else gaps @ carried)
-    measured = initial != 0
-    measured[normal] = np.concatenate(
-        [np.empty(0, bool), *(zone.meshed_apart for zone in scene.zones)]
-    )
-    unloaded = np.zeros(len(area), dtype=bool)
+    measured, unloaded = np.zeros((2, len(area)), dtype=bool)
+    for zone in scene.zones:
+        measured[zone.numbers] = zone.measured
     unloaded[normal] = scene.rest.unloaded_multipliers
     touching = covered / area > MIN_COVERAGE
     _refuse_surfaces(scene, touching)

@@ -13,8 +13,9 @@ from ..scene.parts.part import Term
 from ..scene.scene import Scene
 from .constraints import ContactConstraints
 
-# What an iterate knows that neither the force nor the status changes.
+# What an iterate knows that neither the force nor the status changes; the same of its constraints.
 _OF_DISPLACEMENT = "terms", "elastic", "sizes"
+_OF_GAPS = "_integrals", "opening_size"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,14 +117,14 @@ class ContactIterate:
         What does not depend on the force is not computed anew, and the sizes of stresses stay those
         that they were, also after the iterates that follow: they scale round-off alone.
         """
-        return replace(self, force=force)._with_cached(self, *_OF_DISPLACEMENT)
+        return replace(self, force=force)._with_cached(self, *_OF_DISPLACEMENT, *_OF_GAPS)
 
     def with_closed(
         self, closed: np.ndarray, constraints: ContactConstraints | None = None
     ) -> "ContactIterate":
         """The same displacement, others closed (k,), and with other constraints if given."""
         other = replace(self, closed=closed, constraints=constraints or self.constraints)
-        return other._with_cached(self, *_OF_DISPLACEMENT)
+        return other._with_cached(self, *_OF_DISPLACEMENT, *(() if constraints else _OF_GAPS))
 
     def _with_cached(self, other: "ContactIterate", *names: str) -> "ContactIterate":
         known = vars(other)

@@ -71,7 +71,7 @@ class ZoneScene:
         return self.numbers, *self.slips
 
     @property
-    def meshed_apart(self) -> np.ndarray:
+    def measured(self) -> np.ndarray:
         """Where (k,) the initial gap has a part that is measured on the mesh."""
         given = -self.zone.interference * self.operator.covered
         measured = self.operator.initial != given
