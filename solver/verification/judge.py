@@ -74,17 +74,20 @@ def judge(
     `solved` where they hold but none compares the solution with a reference; `unreliable` whatever
     the checks say, where rounding may have left less than four digits (then `attainable`, the
     relative error that rounding alone may cause, is the first reason), where the solve is beyond
-    what linear theory takes for granted, or where its mesh does not resolve the pressure; `failed`
-    where a step has no solution. `result` is the name of the result file beside the verdict and
-    `sha256` its hash.
+    what linear theory takes for granted, or where its mesh does not resolve the pressure; also
+    where only checks of the solve by itself fail, by no more than `attainable`; `failed` where a
+    step has no solution. `result` is the name of the result file beside the verdict and `sha256`
+    its hash.
     """
     accuracy, scatters = Accuracy(solution.quality.accuracy), unresolved(solution)
     unreliable = [reason for reason in (accuracy.reason, scatters) if reason]
     unreliable += limits_passed(solution.case, solution.quality.validity)
-    reasons = unreliable + [_explained(check, accuracy) for check in checks if not check.passed]
+    broken = [check for check in checks if not check.passed]
+    reasons = unreliable + [_explained(check, accuracy) for check in broken]
     word = PASSED if any(check.verifies for check in checks) else SOLVED
     if reasons:
-        word = UNRELIABLE if unreliable else FAILED
+        rounded = all(_lost(check, accuracy) and not check.verifies for check in broken)
+        word = UNRELIABLE if unreliable or rounded else FAILED
     if solution.ended:
         word, reasons = FAILED, [f"{solution.ended}; the steps before it are kept", *reasons]
     unverified = NOT_VERIFIED
@@ -248,8 +251,12 @@ def _probes(solution: Solution, most: int = 10) -> Iterator[Probed]:
 
 def _explained(check: CheckResult, accuracy: Accuracy) -> str:
     """Why a check fails; with what rounding may do, where its error is no larger than that."""
-    lost = check.tolerance < check.error <= accuracy.estimate
-    return f"{check.reason}; {accuracy.words}" if lost else check.reason
+    return f"{check.reason}; {accuracy.words}" if _lost(check, accuracy) else check.reason
+
+
+def _lost(check: CheckResult, accuracy: Accuracy) -> bool:
+    """Whether a check misses its tolerance by no more than what rounding may do."""
+    return check.tolerance < check.error <= accuracy.estimate
 
 
 def _first_of(reasons: Sequence[str]) -> str:

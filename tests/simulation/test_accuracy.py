@@ -253,3 +253,15 @@ def test_a_gap_that_the_case_gives_is_as_exact_as_it_is_given(gap):
     assert found.verdict == "solved", found.reason
     assert found.pressure == pytest.approx(2e-9, rel=1e-11)
     assert found.solution.quality.accuracy["gap"] < 1e-11
+
+
+@pytest.mark.parametrize("name", ["a-slip", "e-slip"])
+def test_faint_loads_that_slide_are_as_exact_as_others(name):
+    """The sliding patch test at 1e-10 times its pressure: slips are no gaps of the mesh."""
+    content = yaml.safe_load((CASES / f"friction-patch/{name}.yaml").read_text())
+    exact = content["reference"]["solution"]
+    exact |= {key: 1e-10 * exact[key] for key in ("pressure", "traction", "slide")}
+    content["reference"]["dissipation"] = [1e-20 * content["reference"]["dissipation"][0]]
+    found = solve_case(content)
+    assert (found.verdict, found.reason) == ("passed", "")
+    assert found.solution.quality.accuracy["gap"] < 1e-12

@@ -102,6 +102,23 @@ def test_a_result_without_digits_is_unreliable_though_its_checks_hold(tmp_path):
     assert verdict_of(solution)["verdict"] == "passed"
 
 
+@pytest.mark.parametrize(
+    ("rounding", "name", "word"),
+    [(1e-7, "balance", "unreliable"), (1e-9, "balance", "failed"), (1e-7, "multiplier", "failed")],
+)
+def test_the_solve_by_itself_is_judged_no_finer_than_it_is_rounded(tmp_path, rounding, name, word):
+    """A reference is another matter: its tolerance is stated."""
+    solution, checks = plane(tmp_path), []
+    solution.quality.accuracy = {"forces": rounding}
+    for check in run_checks(solution):
+        off = {"error": 1e-8, "tolerance": 1e-10, "passed": False} if check.name == name else {}
+        checks.append(replace(check, **off))
+    found = judge(solution, checks)
+    assert found.verdict == word
+    assert found.reason.startswith(name)
+    assert ("rounding alone may change" in found.reason) == (rounding > 1e-8)
+
+
 def test_what_is_not_a_number_is_null_and_fails(tmp_path):
     solution = plane(tmp_path)
     solution.zones[0].multiplier[0] = np.nan

@@ -223,7 +223,7 @@ def rounding(iterate: ContactIterate) -> Rounding:
     """The errors by rounding in an iterate."""
     scene, constraints = iterate.scene, iterate.constraints
     terms = sum(term.rounded[0] for term in iterate.terms)
-    known = scene.coordinates.rounding * constraints.covered * constraints.rounded
+    known = scene.coordinates.rounding * constraints.covered * constraints.measured
     return Rounding(
         forces=_unit(iterate) * iterate.sizes.forces + EPSILON * terms,
         gaps=known + EPSILON * iterate.opening_size,
@@ -348,7 +348,7 @@ def judged(
         gap=iterate.gap,
         pressure_limit=limit,
         gap_limit=(_NOISE * iterate.opening_size + _NOISE_OF_MOTION * motion) / covered
-        + _ROUNDINGS * scene.coordinates.rounding * constraints.rounded,
+        + _ROUNDINGS * scene.coordinates.rounding * constraints.measured,
     )
 
 

@@ -41,8 +41,8 @@ class ContactConstraints:
     `covered` (k,) whole and intersected; `eligible` (k,) may close; `inactive_multipliers` (k,)
     move nothing; `own` (n_free,) marks the free unknowns of slave nodes, `moving` (k, n_dofs) has
     the coefficients of `gaps` on what supports leave free there. `normal` (k,): not of slip;
-    `measured` (k,): initial gaps with a part that is measured on the mesh; `unloaded` (k,): see
-    `Unloaded`.
+    `measured` (k,): initial gaps with a part that is measured on the mesh, as exact as coordinates
+    are; `unloaded` (k,): see `Unloaded`.
     """
 
     gaps: sparse.csr_matrix
@@ -66,11 +66,6 @@ class ContactConstraints:
     def with_jumps(self, jump: np.ndarray) -> "ContactConstraints":
         """Those of which closed ones keep the mean gap or slip `jump` (k,)."""
         return replace(self, initial=self.initial - self.covered * jump)
-
-    @property
-    def rounded(self) -> np.ndarray:
-        """Where (k,) `initial` is known only as well as coordinates are: measured gaps, slips."""
-        return np.where(self.normal, self.measured, self.initial != 0)
 
     @cached_property
     def dependent(self) -> np.ndarray:
