@@ -24,7 +24,7 @@ from .contact import SurfaceValues, own_solution, pressure_force, surfaces
 from .faults import fault, summed_up
 from .model import Model
 from .path import at_last_position
-from .placing import Placed, Placer, flattened
+from .placing import Placed, Placer, flattened, without_rigid_surfaces
 
 if TYPE_CHECKING:
     import meshio
@@ -74,6 +74,7 @@ class Compared:
             raise InputError(where, "step", foreign.step, allowed)
         foreign = flattened(foreign, mesh.points.shape[1], where, case.thin)
         model = Model.of(case, mesh)
+        foreign = without_rigid_surfaces(foreign, model)
         placer = Placer(model, foreign, where)
         names = ("displacement", "stress", "pressure", "gap")
         fields = {n: f for n in names if (f := getattr(foreign, n)) is not None}

@@ -20,6 +20,7 @@ from ..simulation.results.exact import ExactValues
 from ..simulation.results.records import Cost, Fields, Scalars
 from ..simulation.results.results import body_infos
 from ..simulation.results.solution import Solution, ZoneResult, ZoneSurfaces
+from ..simulation.scene.groups import nodes_of_volumes
 from ..simulation.scene.scene import Scene, ZoneScene, build_scene
 
 
@@ -108,7 +109,10 @@ class Model:
 
     def _zone(self, zone: ZoneScene) -> ZoneResult:
         surface, m = zone.operator.surface, zone.count
-        slave, master = surface_nodes(zone.slave_faces), surface_nodes(zone.master_faces)
+        # Cells of rigid surfaces are not in the mesh.
+        n = len(self.points)
+        meshed = [b.of(np.flatnonzero((b.nodes < n).all(axis=1))) for b in zone.master_faces]
+        slave, master = surface_nodes(zone.slave_faces), surface_nodes(meshed)
         none = np.full(m, np.nan)
         return ZoneResult(
             name=zone.zone.name,
@@ -121,7 +125,7 @@ class Model:
             closed=np.zeros(m, dtype=bool),
             coverage=surface.covered / surface.area,
             surfaces=ZoneSurfaces(
-                master_faces=[(b.type.name, b.nodes) for b in zone.master_faces],
+                master_faces=[(b.type.name, b.nodes) for b in meshed],
                 stress_slave=np.full(len(slave), np.nan),
                 stress_master=np.full(len(master), np.nan),
                 slave_nodes=slave,
@@ -160,9 +164,9 @@ class Model:
 
     @cached_property
     def rigid(self) -> np.ndarray:
-        """Which bodies are rigid."""
+        """Which bodies are rigid; those without cells are."""
         found = np.ones(int(self.body.max()) + 1, dtype=bool)
-        found[self.body[self.solution.deformable]] = False
+        found[self.body[self.solution.deformable & nodes_of_volumes(self.mesh)]] = False
         return found
 
     @cached_property

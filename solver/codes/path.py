@@ -56,7 +56,8 @@ def at_last_position(
     """The case, a result and the mesh where the last step brought the bodies.
 
     `placed` are the fields of the result that `placer` has, by name on the mesh as given.
-    Raises InputError for a result without displacements, or with a place between bodies.
+    Raises InputError for a result without displacements, or with a place between bodies, and for a
+    rigid body without cells.
     """
     model, foreign, where = placer.model, placer.foreign, placer.where
     moved = placed.get("displacement")
@@ -78,6 +79,9 @@ def at_last_position(
     left = moved.values[:, : model.dim] - motion
     fields["displacement"] = replace(fields["displacement"], values=left)
     given, own = with_groups(model.case, model.mesh), None
+    if len(given.points) != len(model.points):
+        problem = "a rigid body without cells: results are not compared where it moves far"
+        raise InputError(model.case.path, "motion", "large", problem)
     there = replace_points(given, frames.placed(given.points, model.body))
     if foreign.mesh is not None and placer.points is not None:
         own = meshio.Mesh(frames.placed(placer.points, placer.body), foreign.mesh.cells)

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..lac.cells.catalogue import BY_MESHIO
 from ..lac.motions import body_numbers
+from ..simulation.scene.groups import without_loose
 from ..system.errors import InputError
 from .foreign import Field, ForeignResult
 from .model import Model
@@ -99,7 +100,7 @@ class Placer:
         for number in np.unique(own[used]):
             mine = used[own[used] == number]
             self.body[mine] = self._body_of(self.points[mine])
-        missing = np.setdiff1d(model.body, self.body)
+        missing = np.setdiff1d(model.body[~model.rigid[model.body]], self.body)
         if len(missing):
             name = model.solution.bodies[int(missing[0])].name
             raise self._refused("mesh", f"nothing of it is where the case has the body {name}")
@@ -188,12 +189,9 @@ class Placer:
 
     def _body_of(self, points: np.ndarray) -> int:
         """The body of the case that a body of the result is, by its extents."""
-        model, extents = self.model, (points.min(axis=0), points.max(axis=0))
-        off = []
-        for number in range(int(model.body.max()) + 1):
-            mine = model.points[model.body == number]
-            sides = (mine.min(axis=0), mine.max(axis=0))
-            off.append(max(np.abs(a - b).max() for a, b in zip(extents, sides, strict=True)))
+        model, extents = self.model, _extents(points)
+        bodies = (model.body == number for number in range(int(model.body.max()) + 1))
+        off = [np.abs(extents - _extents(model.points[mine])).max() for mine in bodies]
         if min(off) > _ALIKE * model.length:
             low, high = (_listed(side) for side in extents)
             raise self._refused("mesh", f"the case has no body from {low} to {high}")
@@ -305,3 +303,44 @@ def flattened(foreign: ForeignResult, dim: int, where: object, thin: bool) -> Fo
         problem = f"moves by {across:.3g} across the plane: the case is one of plane strain"
         raise InputError(where, "displacement", None, problem)
     return replace(foreign, displacement=replace(moved, values=moved.values[:, :2]))
+
+
+def without_rigid_surfaces(foreign: ForeignResult, model: Model) -> ForeignResult:
+    """The result without cells for rigid surfaces, which the case's own mesh does not have.
+
+    Parts without a common node are such cells where their extents are those of no body; a result of
+    which nothing would be left is not changed. Values on them go too.
+    """
+    mesh = foreign.mesh
+    if mesh is None or not model.case.rigid or mesh.points.shape[1] < model.dim:
+        return foreign
+    bodies = [_extents(model.points[model.body == n]) for n in np.unique(model.body)]
+    part = body_numbers(len(mesh.points), {str(i): b.data for i, b in enumerate(mesh.cells)})
+    kept = np.zeros(len(mesh.points), dtype=bool)
+    for number in np.unique(part):
+        mine = _extents(mesh.points[part == number, : model.dim])
+        kept[part == number] = min(np.abs(mine - b).max() for b in bodies) < _ALIKE * model.length
+    if kept.all() or not kept.any():
+        return foreign
+    node = np.cumsum(kept) - 1
+    whole = np.concatenate([kept[block.data].all(axis=1) for block in mesh.cells])
+    cell, fields = np.cumsum(whole) - 1, dict[str, Any]()
+    for name in ("displacement", "stress", *CONTACT):
+        field = getattr(foreign, name)
+        if field is not None and field.nodes is not None:
+            fields[name] = _chosen(field, kept[field.nodes], nodes=node)
+        elif field is not None and field.cells is not None:
+            fields[name] = _chosen(field, whole[field.cells], cells=cell)
+    return replace(foreign, mesh=without_loose(mesh, kept), **fields)
+
+
+def _extents(points: np.ndarray) -> np.ndarray:
+    """The least and the largest coordinates (2, dim)."""
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def _chosen(field: Field, chosen: np.ndarray, **number: np.ndarray) -> Field:
+    """The `chosen` (k,) values of a field, with another `number` of each node or cell."""
+    kept = {name: getattr(field, name) for name in ("places", "values", "nodes", "cells", "area")}
+    kept = {name: None if a is None else np.asarray(a)[chosen] for name, a in kept.items()}
+    return Field(**kept | {name: new[kept[name]] for name, new in number.items()})

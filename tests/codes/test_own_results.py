@@ -21,12 +21,14 @@ from tests.codes.results import ROOT
 
 # Values of cells: of faces that are cut, quadratic, rings, under the end of a master or far from
 # it, with a shear that pressures do not tell, with multipliers at nodes, on two zones; of bodies
-# that moved far, at the last of their positions.
+# that moved far, at the last of their positions; beside rigid surfaces that the mesh does not have,
+# or has as faces alone.
 NAMES = (
     *("ssnp170/e", "shared/cross-quad4-tria3", "axisymmetric/ring-tria6-quad9"),
     *("axisymmetric/before-contact", "uncovered/quad8-quad4", "uncovered/tria6-quad9"),
     *("friction-patch/b-stick", "bending/quad8-tria6-nodal", "bending/tetra10-hexa27"),
     *("motion/slide-c-friction", "motion/rings"),
+    *("rigid/between-planes", "rigid/curved-face", "rigid/lines-of-the-mesh"),
 )
 
 
@@ -91,6 +93,14 @@ def test_the_middle_of_a_face_is_that_of_its_corners_too(name):
     result = ForeignResult(code="mine", pressure=Field(places=places, values=exact))
     verdict = check_foreign(case, result, model.mesh, only=["pressure"])
     assert verdict.verdict == "passed", verdict.reason
+
+
+def test_rigid_surfaces_that_move_far_are_refused_by_name():
+    case = load_case(ROOT / "cases/motion/ironing.yaml")
+    mesh = mesh_of(case)
+    still = Field(places=mesh.points, values=np.zeros_like(mesh.points))
+    with pytest.raises(InputError, match="motion = 'large': a rigid body without cells"):
+        check_foreign(case, ForeignResult(code="mine", displacement=still), mesh)
 
 
 def test_pressures_need_contact():
