@@ -35,9 +35,10 @@ def write_case(folder, name, directions="first", pressure=25.0):
 
 # Importing Snakemake takes most of the time of a small run: one process has done so, and forks.
 FORKS = """
-import json, os, runpy, signal, sys
+import gc, json, os, runpy, signal, sys
 import jsonschema, snakemake.cli
 snakemake.cli.get_argument_parser()  # which imports its plugins
+gc.freeze()
 for line in sys.stdin:
     environment, folder, output, *arguments = json.loads(line)
     if not (run := os.fork()):
