@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
 
+import meshio
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -308,19 +309,14 @@ def flattened(foreign: ForeignResult, dim: int, where: object, thin: bool) -> Fo
 def without_rigid_surfaces(foreign: ForeignResult, model: Model) -> ForeignResult:
     """The result without cells for rigid surfaces, which the case's own mesh does not have.
 
-    Parts without a common node are such cells where their extents are those of no body; a result of
-    which nothing would be left is not changed. Values on them go too.
+    Parts without a common node are such cells where their extents are those of no body. Values on
+    them go too. A result that lacks a body that deforms is not changed.
     """
     mesh = foreign.mesh
-    if mesh is None or not model.case.rigid or mesh.points.shape[1] < model.dim:
+    if mesh is None or not mesh.cells or not model.case.rigid:
         return foreign
-    bodies = [_extents(model.points[model.body == n]) for n in np.unique(model.body)]
-    part = body_numbers(len(mesh.points), {str(i): b.data for i, b in enumerate(mesh.cells)})
-    kept = np.zeros(len(mesh.points), dtype=bool)
-    for number in np.unique(part):
-        mine = _extents(mesh.points[part == number, : model.dim])
-        kept[part == number] = min(np.abs(mine - b).max() for b in bodies) < _ALIKE * model.length
-    if kept.all() or not kept.any():
+    kept = _of_bodies(mesh, model)
+    if kept.all():
         return foreign
     node = np.cumsum(kept) - 1
     whole = np.concatenate([kept[block.data].all(axis=1) for block in mesh.cells])
@@ -332,6 +328,32 @@ def without_rigid_surfaces(foreign: ForeignResult, model: Model) -> ForeignResul
         elif field is not None and field.cells is not None:
             fields[name] = _chosen(field, whole[field.cells], cells=cell)
     return replace(foreign, mesh=without_loose(mesh, kept), **fields)
+
+
+def _of_bodies(mesh: meshio.Mesh, model: Model) -> np.ndarray:
+    """The nodes (n,) of parts that have the extents of a body, and those of no cell.
+
+    All, where a body that deforms has no such part.
+    """
+    dim, every = model.dim, np.ones(len(mesh.points), dtype=bool)
+    if mesh.points.shape[1] < dim:
+        return every
+    part = body_numbers(len(mesh.points), {str(i): b.data for i, b in enumerate(mesh.cells)})
+    used = np.unique(np.concatenate([block.data.ravel() for block in mesh.cells]))
+    low = np.full((int(part.max()) + 1, dim), np.inf)
+    high = -low
+    np.minimum.at(low, part[used], mesh.points[used, :dim])
+    np.maximum.at(high, part[used], mesh.points[used, :dim])
+    numbers = np.unique(model.body)
+    bodies = np.stack([_extents(model.points[model.body == n]) for n in numbers])
+    off = np.abs(np.stack([low, high], axis=1)[:, None] - bodies).max(axis=(2, 3))
+    alike = off.min(axis=1) < _ALIKE * model.length
+    found = numbers[off[alike].argmin(axis=1)]
+    if not np.isin(np.flatnonzero(~model.rigid), found).all():
+        return every
+    kept = every.copy()
+    kept[used] = alike[part[used]]
+    return kept
 
 
 def _extents(points: np.ndarray) -> np.ndarray:
