@@ -24,6 +24,11 @@ from ..simulation.scene.groups import nodes_of_volumes
 from ..simulation.scene.scene import Scene, ZoneScene, build_scene
 
 
+def extents_of(points: np.ndarray) -> np.ndarray:
+    """The least and the largest coordinates (2, dim) of points (k, dim)."""
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
 @dataclass(frozen=True)
 class Model:
     """The case, its mesh, and the scene that our solver would solve.
@@ -61,6 +66,12 @@ class Model:
     def body(self) -> np.ndarray:
         """The body (n,) of each node."""
         return self.scene.body[: len(self.points)]
+
+    @cached_property
+    def extents(self) -> np.ndarray:
+        """Those of each body (b, 2, dim), of its nodes in the mesh."""
+        bodies = (self.body == number for number in range(int(self.body.max()) + 1))
+        return np.stack([extents_of(self.points[mine]) for mine in bodies])
 
     @cached_property
     def direction(self) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..lac.motions import body_numbers
 from ..simulation.scene.groups import without_loose
 from ..system.errors import InputError
 from .foreign import Field, ForeignResult
-from .model import Model
+from .model import Model, extents_of
 from .surface_cells import SurfaceCells
 
 # Places agree within this share of the model's length: files give six digits at times.
@@ -94,13 +94,9 @@ class Placer:
         if all(BY_MESHIO[b.type].dim <= model.dim for b in mesh.cells):  # no layer of a plane case
             self.first = np.concatenate([block.data[:, 0] for block in mesh.cells])
         self._refuse_elsewhere(self.points, "mesh", whole=True)
-        cells = {str(i): block.data for i, block in enumerate(mesh.cells)}
-        own = body_numbers(len(mesh.points), cells)
-        used = np.unique(np.concatenate([c.ravel() for c in cells.values()]))
-        self.body = np.full(len(own), -1)
-        for number in np.unique(own[used]):
-            mine = used[own[used] == number]
-            self.body[mine] = self._body_of(self.points[mine])
+        self.body = np.full(len(mesh.points), -1)
+        for part in _parts(mesh):
+            self.body[part] = self._body_of(self.points[part])
         missing = np.setdiff1d(model.body[~model.rigid[model.body]], self.body)
         if len(missing):
             name = model.solution.bodies[int(missing[0])].name
@@ -190,13 +186,11 @@ class Placer:
 
     def _body_of(self, points: np.ndarray) -> int:
         """The body of the case that a body of the result is, by its extents."""
-        model, extents = self.model, _extents(points)
-        bodies = (model.body == number for number in range(int(model.body.max()) + 1))
-        off = [np.abs(extents - _extents(model.points[mine])).max() for mine in bodies]
-        if min(off) > _ALIKE * model.length:
-            low, high = (_listed(side) for side in extents)
+        off = _apart(points, self.model)
+        if off.min() > _ALIKE * self.model.length:
+            low, high = (_listed(side) for side in extents_of(points))
             raise self._refused("mesh", f"the case has no body from {low} to {high}")
-        return int(np.argmin(off))
+        return int(off.argmin())
 
     def _refuse_elsewhere(self, places: np.ndarray, name: str, whole: bool) -> None:
         """Refuse places that are not the case's, by what would make them so."""
@@ -338,27 +332,28 @@ def _of_bodies(mesh: meshio.Mesh, model: Model) -> np.ndarray:
     dim, every = model.dim, np.ones(len(mesh.points), dtype=bool)
     if mesh.points.shape[1] < dim:
         return every
-    part = body_numbers(len(mesh.points), {str(i): b.data for i, b in enumerate(mesh.cells)})
-    used = np.unique(np.concatenate([block.data.ravel() for block in mesh.cells]))
-    low = np.full((int(part.max()) + 1, dim), np.inf)
-    high = -low
-    np.minimum.at(low, part[used], mesh.points[used, :dim])
-    np.maximum.at(high, part[used], mesh.points[used, :dim])
-    numbers = np.unique(model.body)
-    bodies = np.stack([_extents(model.points[model.body == n]) for n in numbers])
-    off = np.abs(np.stack([low, high], axis=1)[:, None] - bodies).max(axis=(2, 3))
-    alike = off.min(axis=1) < _ALIKE * model.length
-    found = numbers[off[alike].argmin(axis=1)]
-    if not np.isin(np.flatnonzero(~model.rigid), found).all():
+    parts = _parts(mesh)
+    off = np.stack([_apart(mesh.points[part, :dim], model) for part in parts])
+    alike = off.min(axis=1) <= _ALIKE * model.length
+    if not np.isin(np.flatnonzero(~model.rigid), off[alike].argmin(axis=1)).all():
         return every
     kept = every.copy()
-    kept[used] = alike[part[used]]
+    for number in np.flatnonzero(~alike):
+        kept[parts[number]] = False
     return kept
 
 
-def _extents(points: np.ndarray) -> np.ndarray:
-    """The least and the largest coordinates (2, dim)."""
-    return np.stack([points.min(axis=0), points.max(axis=0)])
+def _parts(mesh: meshio.Mesh) -> list[np.ndarray]:
+    """The nodes (k,) of each part of a mesh; parts have no common node."""
+    part = body_numbers(len(mesh.points), {str(i): b.data for i, b in enumerate(mesh.cells)})
+    used = np.unique(np.concatenate([block.data.ravel() for block in mesh.cells]))
+    used = used[np.argsort(part[used], kind="stable")]
+    return np.split(used, np.flatnonzero(np.diff(part[used])) + 1)
+
+
+def _apart(points: np.ndarray, model: Model) -> np.ndarray:
+    """How far the extents of points (k, dim) are from those of each body (b,)."""
+    return np.asarray(np.abs(extents_of(points) - model.extents).max(axis=(1, 2)))
 
 
 def _chosen(field: Field, chosen: np.ndarray, **number: np.ndarray) -> Field:
