@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 
 from ..case.reader import parse_case
+from ..lac.errors import SolveError
 from ..system.errors import InputError
 from ..system.files import write_text
 from ..system.package import PROGRAM, workflow_folder
@@ -59,7 +60,7 @@ def run_validate(options: argparse.Namespace) -> int:
     return status
 
 
-def _refusals(path: Path, with_mesh: bool) -> Iterator[InputError]:
+def _refusals(path: Path, with_mesh: bool) -> Iterator[InputError | str]:
     """What is wrong with a case; `with_mesh`: on its mesh too, each once."""
     from ..case.reader import check_mesh_file, load_case
 
@@ -82,6 +83,8 @@ def _refusals(path: Path, with_mesh: bool) -> Iterator[InputError]:
                     told.add(str(error))
     except InputError as error:
         yield error
+    except SolveError as error:
+        yield f"{path}: {error}"
 
 
 def add_mesh(command: argparse.ArgumentParser) -> None:

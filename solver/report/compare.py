@@ -1,4 +1,4 @@
-"""Two batches side by side: Markdown for the terminal, and a page in the style of the report's.
+"""Two batches side by side, as Markdown.
 
 Verdicts, numbers and times differ. A number has changed when it moved by more than accepted values
 may: 1e-9 of the check's scale. What round-off does is no change. Times are shown and never judged.

@@ -140,7 +140,7 @@ def _in_place(
                 carried = groups.motion - (0.0 if last is None else last.displacement)
                 problem = ContactProblem(scene, carried.ravel())
         except InputError as error:
-            if last is None:
+            if last is None and count == 1:
                 raise
             raise SolveError(f"{error.key}: {error.problem}") from None
         with stage(clock, "solve"):

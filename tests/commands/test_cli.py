@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -318,21 +317,6 @@ def test_new_writes_a_case_that_is_valid_and_passes(tmp_path, monkeypatch, capsy
     ]
     assert main(["new", "../mine", "-o", "x.yaml"]) == 2
     assert not Path("x.yaml").exists()
-
-
-def test_validate_goes_through_all_files(small, capsys):
-    (small / "bad.yaml").write_text(PLANE.replace("small", "a/b"))
-    (small / "even.yaml").write_text(PLANE.replace("size: 50.0", "size: -50.0"))
-    (small / "lost.yaml").write_text(re.sub("mesh:\n(  .*\n)+", "mesh: {file: lost.msh}\n", PLANE))
-    paths = [
-        str(small / name) for name in ("bad.yaml", "c.yaml", "even.yaml", "lost.yaml", "none.yaml")
-    ]
-    assert main(["validate", *paths]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == f"{paths[1]}: valid\n"
-    assert "lost.yaml: mesh.file = " in printed.err
-    assert "even.yaml: mesh.size = -50.0: must be a positive number" in printed.err
-    assert len(printed.err.splitlines()) == 4
 
 
 def test_wrong_usage_is_2():

@@ -349,6 +349,13 @@ def test_the_slip_of_all_steps_turns_with_the_slave():
     assert joined.quality.validity == solution.quality.validity
 
 
+def test_a_place_that_a_step_brings_bodies_to_is_no_fault_of_the_input():
+    soft = moving(materials={"all": {"young": 2.0, "poisson": 0.3}})
+    assert not list(refusals_on(soft, mesh_of(soft)))
+    with pytest.raises(SolveError, match=r"^step 1 .*: the surfaces overlap by 7\."):
+        run(soft)
+
+
 FAULTS = {
     "frames are not followed": (
         "solver.simulation.motion._followed",

@@ -82,8 +82,11 @@ def build(
     try:
         solution = cls(**{n: value for n, value in taken.items() if value is not None})
     except ParameterError as error:
-        path = f"{key}.{error.parameter}"
-        raise InputError(known.where, path, error.value, error.allowed) from None
+        parameter = error.parameter
+        shown = values.get(parameter, error.value)
+        if isinstance(shown, Material):  # the case's own
+            shown = parameter if parameter in known.materials else _ALL
+        raise InputError(known.where, f"{key}.{parameter}", shown, error.allowed) from None
     if solution.dim != known.dimension:
         allowed = f"is for {solution.dim} dimensions; the case has {known.dimension}"
         raise InputError(known.where, key, name, allowed)

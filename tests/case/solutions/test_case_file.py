@@ -69,6 +69,8 @@ def test_a_parameter_takes_the_material_of_its_own_name_or_of_all():
     )
     case = parse("{name: nested_cylinders, radii: [1, 2, 3]}", plain=plain)
     assert case.reference.exact.inner == case.reference.exact.outer == Material(2000.0, 0.3)
+    with pytest.raises(InputError, match="material = 'all': must have a Poisson's ratio of 0"):
+        parse("parabola_2d", plain=plain)
 
 
 def test_a_body_may_be_rigid():
@@ -105,7 +107,7 @@ def test_a_plane_state_fills_three_dimensions_but_is_not_around_an_axis():
         ("{name: nested_cylinders, radii: [1, 2, 3]}", "inner: must be a group with a material"),
         (TUBES.replace("radii", "radius"), "no such parameter; did you mean radii?"),
         (TUBES.replace("bottom", "botom"), "reference.solution.inner = 'botom': must be a group"),
-        (TUBES.replace("[20, 30, 40]", "[20, 30]"), "radii = (20.0, 30.0): must be three radii"),
+        (TUBES.replace("[20, 30, 40]", "[20, 30]"), "radii = [20, 30]: must be three radii"),
         (TUBES.replace("[20, 30, 40]", "[20, a, 40]"), "radii[1] = 'a': must be a number"),
         (
             TUBES.replace("[20, 30, 40]", "[1.0e-300, 30, 40]"),
@@ -120,6 +122,7 @@ def test_a_plane_state_fills_three_dimensions_but_is_not_around_an_axis():
         ("{name: sheared, friction: 0.5, shear: [0.5]}", "contact: this key is needed"),
         ("{name: sheared, contact: 0.5}", "contact = 0.5: no such solution"),
         ("{name: sheared, contact: null}", "contact: must have a value"),
+        ("{name: parabola_2d, material: top}", "material = 'top': must have a Poisson's ratio"),
     ],
 )
 def test_refused(solution, message):
