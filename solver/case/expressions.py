@@ -71,6 +71,10 @@ class Expression:
         except ValueError as error:
             raise self._error(str(error)) from None
 
+    def __repr__(self) -> str:
+        """As a case file has it."""
+        return repr(self.text)
+
     @property
     def names(self) -> frozenset[str]:
         """The names that occur in the expression."""

@@ -26,7 +26,9 @@ from ..system.errors import InputError, hint, key_path
 Text = Annotated[str, Meta(min_length=1, description="text")]
 Version = Annotated[str, Meta(min_length=1, description="text (in quotes if it is a number)")]
 Number = Annotated[float, Meta(ge=-1e30, le=1e30, description="a number from -1e30 to 1e30")]
-Positive = Annotated[float, Meta(gt=0, le=1e30, description="a positive number up to 1e30")]
+Positive = Annotated[
+    float, Meta(ge=1e-30, le=1e30, description="a positive number from 1e-30 to 1e30")
+]
 ONCE = Meta(min_length=1, extra_json_schema={"uniqueItems": True})
 """Of a list: it has items, and they differ."""
 
@@ -81,7 +83,7 @@ def read_as(
     """
     convert = partial(msgspec.convert, dec_hook=partial(_file_beside, where))
     try:
-        if not _has_null(content):
+        if not _null(content):
             return convert(content, kind)
     except msgspec.ValidationError:
         pass
@@ -249,11 +251,12 @@ def _different(kind: type[Section]) -> list[str]:
     ]
 
 
-def _has_null(value: object) -> bool:
-    """Whether a key has no value."""
+def _null(value: object) -> Keys:
+    """The keys that lead to the first one without a value; empty where there is none."""
     if isinstance(value, dict):
-        return any(item is None or _has_null(item) for item in value.values())
-    return isinstance(value, list) and any(map(_has_null, value))
+        return next(((k, *_null(v)) for k, v in value.items() if v is None or _null(v)), ())
+    items = enumerate(value) if isinstance(value, list) else ()
+    return next(((i, *_null(item)) for i, item in items if _null(item)), ())
 
 
 def _fits(convert: Convert, value: object, kind: Any) -> bool:
@@ -261,7 +264,7 @@ def _fits(convert: Convert, value: object, kind: Any) -> bool:
         convert(value, kind)
     except msgspec.ValidationError:
         return False
-    return not _has_null(value)
+    return not _null(value)
 
 
 def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
@@ -289,8 +292,9 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
             return FieldError((*keys, *own.keys), own.problem, value)
     # `2,5`, as some countries write it, is text.
     point = "; write numbers with a point" * bool(re.fullmatch(r"-?\d+,\d+", str(value)))
-    words = described(kind)
-    return FieldError(keys, f"must be {words}{point}" if words else "must have a value", value)
+    if words := described(kind):
+        return FieldError(keys, f"must be {words}{point}", value)
+    return FieldError((*keys, *_null(value)), "must have a value")
 
 
 def _is_like(kind: Any, value: object) -> bool:

@@ -70,5 +70,5 @@ def key_path(keys: Iterable[str | int]) -> str:
 
 
 def _shorten(value: object, length: int = 80) -> str:
-    text = " ".join(repr(value).split())
+    text = " ".join(repr(list(value) if isinstance(value, tuple) else value).split())
     return text if len(text) <= length else text[: length - 1] + "…"

@@ -270,6 +270,8 @@ CHANGED = [
     ("name: block", "name: a-swapped", "name = 'a-swapped': must not end in -swapped"),
     ("young: 1.0", "young: 0.0", "materials.all.young = 0.0: must be a positive number"),
     ("young: 1.0", "young: -1", "materials.all.young = -1: must be a positive number"),
+    ("young: 1.0", "young: 1e-31", "materials.all.young = 1e-31: must be a positive number from"),
+    ("mesh: {", "mesh: {top: {cells: TRIA3, far: null}, ", "mesh.top.far: must have a value"),
     ("young: 1.0", "young: stiff", "materials.all.young = 'stiff': must be a positive number"),
     ("young: 1.0, ", "", "materials.all.young: this key is needed"),
     ("young: 1.0, ", "young: 1.0, rho: 1, ", "materials.all.rho = 1: unknown key; allowed: "),

@@ -261,6 +261,7 @@ def test_accepted_values_are_written_below_the_current_folder_alone(small, capsy
         ("divisions: 3", f"divisions: [{'9' * 200}, 2]", 2),
         ("pressure: 25.0}]", f"pressure: x{'.a' * 499}}}]", 2),
         ("pressure: 25.0}]", "pressure: 1.0e+300}]", 2),
+        ("young: 2000.0", "young: 1.0e-300", 2),
     ],
 )
 def test_numbers_beyond_all_measure_end_in_one_line(small, old, new, status):

@@ -73,7 +73,7 @@ def test_every_key_of_a_case_file_is_in_the_table(site):
     assert table.count("\n| `") > 60
     assert "| `contact[].hexahedra` | the cells into which slave hexahedra are cut | " in table
     assert "pyramids or hexahedra | `pyramids` |" in table
-    assert "| a positive number up to 1e30 | needed |" in table
+    assert "| a positive number from 1e-30 to 1e30 | needed |" in table
     assert "`directions` | solved once, or again with slave and master exchanged | " in table
 
 
