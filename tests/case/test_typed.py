@@ -79,7 +79,10 @@ def test_a_file_becomes_an_object():
         ("by_place: {left: null}\nbolts: []", "by_place.left: must be {name, size, head, turns}"),
         ("sizes: [1, 2, 1.0]\nbolts: []", "= [1, 2, 1.0]: must be a list of a positive number"),
         ("sizes: [1, 1]\nbolts: []", "a positive number from 1e-30 to 1e30, each once"),
-        ("sizes: []\nbolts: []", "sizes = []: must be a list of a positive number from 1e-30 to 1e30"),
+        (
+            "sizes: []\nbolts: []",
+            "sizes = []: must be a list of a positive number from 1e-30 to 1e30",
+        ),
         (
             "bolts: [{name: a, size: 1}, {name: b, size: 1}, {name: c, size: 1}]",
             "bolts[2].name = 'c': there is no third place",
