@@ -292,9 +292,8 @@ def _fault(convert: Convert, value: Any, kind: Any, keys: Keys) -> FieldError:
             return FieldError((*keys, *own.keys), own.problem, value)
     # `2,5`, as some countries write it, is text.
     point = "; write numbers with a point" * bool(re.fullmatch(r"-?\d+,\d+", str(value)))
-    if words := described(kind):
-        return FieldError(keys, f"must be {words}{point}", value)
-    return FieldError((*keys, *_null(value)), "must have a value")
+    words, empty = described(kind), FieldError((*keys, *_null(value)), "must have a value")
+    return FieldError(keys, f"must be {words}{point}", value) if words else empty
 
 
 def _is_like(kind: Any, value: object) -> bool:

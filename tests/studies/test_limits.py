@@ -149,6 +149,16 @@ def test_a_mesh_file_is_halved_and_nothing_else(capsys):
     assert said == f"{case}: --refine = 3: of a mesh file must be {HALVINGS_TEXT}\n"
 
 
+def test_meshes_without_a_solution_are_named_with_their_reason(tmp_path, capsys):
+    pulled = (CASES / "ssnp170" / "a.yaml").read_text().replace("pressure: 25", "pressure: -25")
+    (tmp_path / "a.yaml").write_text(pulled)
+    assert main(["converge", str(tmp_path / "a.yaml")]) == 3
+    *lost, end = capsys.readouterr().out.splitlines()
+    assert end == "No exact value is known."
+    for level, line in zip((1, 2, 4), lost, strict=True):
+        assert line.startswith(f"case-0/a/{level}: failed: nothing keeps ")
+
+
 @pytest.mark.parametrize("levels", [["1", "2"], ["4", "2", "1"]])
 def test_levels_are_three_and_rise(levels, capsys):
     assert main(["converge", str(CASES / "ssnp170" / "a.yaml"), "--levels", *levels]) == 2

@@ -67,3 +67,5 @@ def test_the_expected_errors_of_a_case_are_those_of_its_ladder(capsys):
     assert printed.keys() == given.keys()
     for name, error in given.items():
         assert printed[name] == pytest.approx(error, rel=0.1)
+    assert main(["expect", str(MANUFACTURED.parent / "ssnp170" / "a.yaml")]) == 0
+    assert capsys.readouterr().out == "# no check against a reference errs by more than round-off\n"
