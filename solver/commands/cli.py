@@ -7,6 +7,7 @@ command that is run is imported, and what it needs when it runs, so that help co
 
 import argparse
 import io
+import math
 import os
 import platform
 import signal
@@ -14,7 +15,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -31,9 +32,24 @@ PASSED, FAILED, REFUSED, NO_RESULT, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
 def add_threads(command: argparse.ArgumentParser) -> None:
     """Let a command take `--threads`."""
-    command.add_argument(
-        "--threads", type=int, metavar="N", help="number of threads, unless the environment sets it"
-    )
+    text = "number of threads, unless the environment sets it"
+    command.add_argument("--threads", type=threads, metavar="N", help=text)
+
+
+def threads(text: str) -> int:
+    """A number of threads, as an option gives it."""
+    if not text.isdecimal() or not 1 <= int(text) <= _MOST_THREADS:
+        allowed = f"must be a whole number from 1 to {_MOST_THREADS}"
+        raise argparse.ArgumentTypeError(f"{allowed}, not {text!r}")
+    return int(text)
+
+
+def positive(text: str) -> float:
+    """A limit, as an option gives it."""
+    with suppress(ValueError):
+        if 0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"must be a positive number, not {text!r}")
 
 
 def limit_threads(number: int) -> None:
@@ -98,6 +114,7 @@ _OF_WORKFLOW = {
 }
 
 
+_MOST_THREADS = 1024
 # Characters that UTF-8 cannot encode, such as those of an odd file name, are written escaped.
 _ESCAPED = "backslashreplace"
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..system.errors import InputError
-from .cli import FAILED, PASSED, print_checks
+from .cli import FAILED, PASSED, positive, print_checks
 from .jobs import case_file
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ def run_export(options: argparse.Namespace) -> int:
 def add_run(command: argparse.ArgumentParser) -> None:
     _add_case(command)
     command.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
-    command.add_argument("--seconds", type=float, default=120.0, help="the time limit (120)")
-    command.add_argument("--memory", type=float, default=4000.0, help="the limit, MB (4000)")
+    command.add_argument("--seconds", type=positive, default=120.0, help="the time limit (120)")
+    command.add_argument("--memory", type=positive, default=4000.0, help="the limit, MB (4000)")
 
 
 def run_run(options: argparse.Namespace) -> int:
