@@ -12,6 +12,7 @@ from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.mesh import generate
 from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.scene.parts.strain import InitialStrain
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
 from solver.system.errors import InputError
@@ -224,6 +225,15 @@ def test_strain_is_no_load_that_contact_has_to_balance(lost):
     )
     eligible = problem.constraints.eligible.sum()
     assert problem._gap_stiffness({"heat": 1.0}).shape == (eligible, eligible)
+
+
+def test_what_is_taken_off_is_rounded_as_far_as_it_is_there():
+    """E e/(1 − ν) in plane stress, times the factor of the step: none where the heat is gone."""
+    scene = build_scene(parse_case(BAR, Path("bar.yaml")), bar())
+    [heat] = [part for part in scene.parts if isinstance(part, InitialStrain)]
+    rounded = [heat.term(None, np.array([factor])).rounded[1] for factor in (0.0, 0.5, -2.0)]
+    whole = YOUNG * E / (1 - POISSON)
+    assert rounded == pytest.approx([0.0, 0.5 * whole, 2 * whole], rel=1e-12)
 
 
 def test_steps_scale_the_strain_of_their_name():

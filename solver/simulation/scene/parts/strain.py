@@ -95,7 +95,11 @@ def strain_in(
 class _StrainTerm(Term):
     def __init__(self, loads: StrainLoads, factors: np.ndarray, displacement: Displacement):
         self._loads, self._factors, self._displacement = loads, factors, displacement
-        self.rounded = 0.0, float(np.abs(loads.stress).max())
+
+    @property
+    def rounded(self) -> tuple[Nodal, float]:  # type: ignore[override]
+        stress = np.tensordot(np.abs(self._factors), np.abs(self._loads.stress), axes=1)
+        return 0.0, float(stress.max())
 
     def advanced(self, change: np.ndarray) -> np.ndarray:  # noqa: ARG002
         return self._factors
