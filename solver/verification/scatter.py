@@ -21,7 +21,7 @@ import numpy as np
 from ..lac.cells.catalogue import cell_type
 from ..lac.cells.neighbours import SAME_SIDE, vertex_neighbours
 from ..lac.facets import tangents_of
-from ..simulation.equilibrium.rest import stress_of_motion
+from ..simulation.equilibrium.rest import AT_REST, FAINT, LITTLE, stress_of_motion
 from ..simulation.judgement.validity import allowed_of_pressure
 from ..simulation.results.solution import Solution, ZoneResult
 
@@ -42,9 +42,6 @@ _REACH = 1.3
 _RANK, _CENTRED = 0.03, 0.3
 # Neighbours in a line have no part across it, up to rounding.
 _IN_LINE = 1e-9
-# Pressures below this share of those of all steps, or of the stress that the displacement could
-# cause, are rounding.
-_ROUNDING = 1e-12
 # A macro-element that is covered by less than this has a mean of another place.
 _COVERED = 0.99
 
@@ -52,15 +49,16 @@ _COVERED = 0.99
 def unresolved(solution: Solution) -> str:
     """Why the pressure is unreliable: its scatter, and what to do; empty where it is resolved.
 
-    A case may allow larger errors of the pressure by its tolerances.
+    A case may allow larger errors of the pressure by its tolerances. What is left of a zone's
+    pressures of other steps is not judged.
     """
     case, moved = solution.case, solution.displacement
     limit = allowed_of_pressure(case, LIMIT)
     caused = stress_of_motion(case, solution.scalars.length, moved)
-    rounding = _ROUNDING * max(caused, solution.largest_pressure)
+    rounding = max(AT_REST * caused, FAINT * solution.largest_pressure)
     for given, zone in zip(case.zones, solution.zones, strict=True):
-        peak = zone.multiplier[zone.closed].max(initial=0.0)
-        if zone.nodal is not None or not peak > rounding:
+        peak, least = zone.multiplier[zone.closed].max(initial=0.0), solution.largest_in(zone.name)
+        if zone.nodal is not None or not peak > max(rounding, LITTLE * least):
             continue
         found = scatter(solution.mesh.points, zone)
         if found > limit:

@@ -12,6 +12,8 @@ from solver.case.reader import parse_case
 from solver.codes.deck import UnsupportedError, deck_of
 from solver.mesh import generate
 from solver.simulation.equilibrium.problem import ContactProblem
+from solver.simulation.equilibrium.step import solve_step
+from solver.simulation.results.balance import energy_at_nodes
 from solver.simulation.scene.parts.strain import InitialStrain
 from solver.simulation.scene.scene import build_scene
 from solver.simulation.simulate import simulate
@@ -214,6 +216,18 @@ def test_a_heated_bar_closes_the_gaps_at_its_ends():
         forces = [abs(result.force[1]) for result in step.resultants.values()]
         assert forces == pytest.approx([pressure, pressure], rel=1e-11)
     assert found.zones[0].multiplier == pytest.approx(pressure, rel=1e-11)
+
+
+@pytest.mark.parametrize(("plane", "form"), FORMS[:3])
+def test_each_body_has_its_own_energy(plane, form):
+    """Pressed by p each block closes by p/E', one that is heated too, and has p²/2E'."""
+    text = BAR.replace("plane: stress", f"plane: {plane}").replace("0.3}", f"0.3{form}}}")
+    problem = ContactProblem(build_scene(parse_case(text, Path("bar.yaml")), bar()))
+    state = solve_step(problem, {"heat": 1.0}, None)
+    stiff = YOUNG / (1 - POISSON**2 * (plane == "strain"))
+    pressure = stiff * (E - 4e-4) / 3
+    energy = np.bincount(problem.scene.body, energy_at_nodes(state).astype(float))
+    assert energy == pytest.approx([pressure**2 / (2 * stiff)] * 3, rel=1e-10)
 
 
 @pytest.mark.parametrize("lost", ["lower", "upper"])

@@ -192,7 +192,7 @@ def test_a_shaft_with_oversize_opens_a_tube_as_lame_has_it():
         ),
         (
             [("supports:", "reference: {kind: analytical, moment: {die: [0, 0, 1]}}\nsupports:")],
-            "reference.moment.die = (0.0, 0.0, 1.0): must be a number here",
+            "reference.moment.die = [0.0, 0.0, 1.0]: must be a number here",
         ),
         (
             [

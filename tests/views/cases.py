@@ -23,7 +23,7 @@ RECOVERY = ("none", "none", "linear", "quadratic", "smooth", "automatic")
 OTHERS = ("uncut", "quadrature", "node_to_segment", "nodal", "nodal_dual")
 
 # Facets of curved contact change their pressure by more than a tenth, or are as deep as it closes.
-_FACETED = ("frames", "smooth", "apart", "rest", "left")
+_FACETED = ("frames", "smooth", "apart", "rest", "left", "cooled")
 FOUND: dict[str, Case] = yaml.safe_load((Path(__file__).parent / "found.yaml").read_text())
 
 

@@ -12,13 +12,20 @@ from solver.lac.errors import SolveError
 from solver.lac.status import find_status
 from solver.mechanics.linear import condensation
 from solver.mechanics.mortar.coulomb import CoulombContact
-from solver.simulation.equilibrium import contact_stiffness, friction_recovery, problem, recovery
+from solver.simulation.equilibrium import (
+    accuracy,
+    contact_stiffness,
+    friction_recovery,
+    problem,
+    recovery,
+)
 from solver.simulation.equilibrium.contacts import Contacts
 from solver.simulation.equilibrium.friction import Search
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement import facet_gaps, validity
 from solver.simulation.results.balance import strain_energy
 from solver.simulation.scene.attributes import Attributes
+from solver.verification import scatter
 
 from .cases import FOUND, drawn, word_of
 from .judge import compared
@@ -124,11 +131,14 @@ PLANTED = {
     "bare": (Attributes, "_materials", deforming),
     "rounded": (faces, "FLAT", 1e-15),
     "soft": (ContactProblem, "gives_way_where", lambda _problem, _pressed: False),
+    "cooled": (facet_gaps, "_closing", of_all),
+    "idle": (scatter, "LITTLE", 0.0),
+    "sideways": (accuracy, "LITTLE", 0.0),
 }
 
 
 # What these faults do depends on rounding, so on the processor: seeds of cases that show them too.
-OTHERS = {"left": [123], "lifts": [24, 34, 39], "shrunk": [128]}
+OTHERS = {"left": [123], "lifts": [24, 34, 39], "shrunk": [128], "touching": [686]}
 
 
 @pytest.mark.parametrize("name", PLANTED)

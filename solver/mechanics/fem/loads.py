@@ -159,7 +159,7 @@ class StrainLoads:
     """What k initial strains do, each by itself; all but the energy are linear in them.
 
     `force` (k, n, dim) at nodes; `stress` (k, n, 6), C ε₀ at nodes as `nodal_stress` averages it;
-    `energy` (k, k), ∫ ε₀:C:ε₀.
+    `energy` (n, k, k), ∫ ε₀:C:ε₀ over each cell, at its first node.
     """
 
     force: np.ndarray
@@ -176,7 +176,7 @@ def strain_loads(
     """
     n, dim = points.shape
     force, stress = np.zeros((count, n, dim)), np.zeros((count, n, 6))
-    energy, around = np.zeros((count, count)), np.zeros(n)
+    energy, around = np.zeros((n, count, count)), np.zeros(n)
     for block in blocks:
         reference, weights = block.rule
         fit = extrapolation(block.type, reference)
@@ -198,7 +198,8 @@ def strain_loads(
                 np.add.at(stress[i], some.cells, at_nodes[i])
             # Each component across the axes is twice in the tensor.
             weighted[..., 3:] *= 2
-            energy += np.einsum("kcqs,lcqs->kl", weighted, strain, optimize=True)
+            by_cell = np.einsum("kcqs,lcqs->ckl", weighted, strain, optimize=True)
+            np.add.at(energy, some.cells[:, 0], by_cell)
         around += np.bincount(block.cells.ravel(), minlength=n)
     stress /= np.maximum(around, 1)[:, None]
     return StrainLoads(force=force, stress=stress, energy=energy)

@@ -86,6 +86,13 @@ class MeanStress:
         scaled = sparse.diags(1 / self.compliance) @ self.divergence
         return (self.divergence.T @ scaled).tocsr()
 
+    def on_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Values (size,) of the unknowns at nodes (n,), each at one of a cell that has it."""
+        node = np.zeros(self.size, dtype=int)
+        for part in self._parts:
+            node[part.unknowns] = part.cells[:, :1]
+        return np.bincount(node, values, minlength=self._shape[0])
+
     def force(self, stress: np.ndarray) -> np.ndarray:
         """Internal forces (n_nodes, dim) of s (size,): Bᵀ s."""
         return (self.divergence.T @ stress).reshape(self._shape)

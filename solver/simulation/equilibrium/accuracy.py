@@ -36,7 +36,7 @@ from ...mechanics.fem.block import Block
 from ...mechanics.fem.stress import steepest, steepness
 from ..scene.scene import Scene
 from .iterate import ContactIterate
-from .rest import AT_REST, forces_of_others, rests, stress_at_rest
+from .rest import AT_REST, LITTLE, forces_of_others, rests, stress_at_rest
 
 EPSILON = float(np.finfo(float).eps)
 EPSILON_EXTENDED = float(np.finfo(np.longdouble).eps)
@@ -297,14 +297,18 @@ def _resultants(loose: sparse.csr_matrix, sums: np.ndarray, loads: np.ndarray) -
 
 
 def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float, loaded: float) -> float:
-    """What loads (`loaded`), strains or motions cause where the `pressure` is rounding; else 0."""
+    """What loads (`loaded`), strains or motions cause where the `pressure` is rounding; else 0.
+
+    It is where it is little beside loads and no more than ten times its error.
+    """
     # Without loads the forces are those of initial strains.
     at_rest = not loaded or forces_of_others(iterate) > 0
     stress = stress_at_rest(iterate.scene, iterate.displacement.total)
     nothing = AT_REST * max(loaded, stress if at_rest else 0.0)
     if pressure <= nothing or (at_rest and error >= pressure) or rests(iterate):
         return max(loaded, stress, iterate.sizes.highest)
-    return loaded if error >= pressure else 0.0
+    faint = pressure <= LITTLE * loaded and pressure <= ERRORS * error
+    return loaded if error >= pressure or faint else 0.0
 
 
 def judged(

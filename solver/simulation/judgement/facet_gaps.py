@@ -21,7 +21,7 @@ from ...lac.cells.shape import shape_functions
 from ..equilibrium.problem import ContactProblem
 from ..equilibrium.rest import LITTLE
 from ..equilibrium.state import Equilibrium
-from ..results.balance import strain_energy, work_of_forces
+from ..results.balance import energy_at_nodes
 from ..scene.scene import Scene, ZoneScene
 
 # A vertex whose mean normal leans by more against a face's own is on an edge of the body.
@@ -119,19 +119,17 @@ def _closing(problem: ContactProblem, state: Equilibrium, pushed: np.ndarray) ->
     """By how much (k,) contact closes elastically where forces `pushed` (k,) act.
 
     Twice the strain energy over ∫ p, the largest it can be, of the bodies that contact joins: what
-    stands apart from them does not count, unless initial strains make the energy one of all.
+    stands apart from them does not count.
     """
     scene, found = problem.scene, np.zeros(len(pushed))
     dim, normal = scene.points.shape[1], problem.constraints.normal
-    if any(term.energy for term in state.iterate.terms):
-        force = float(pushed[normal].sum())
-        return found + (2 * strain_energy(state) / force if force > 0 else 0.0)
-    work = np.bincount(scene.body, work_of_forces(state).sum(axis=1).astype(float))
+    energy = np.bincount(scene.body, energy_at_nodes(state).astype(float))
     for part in problem.parts:
         moving = np.flatnonzero(scene.free.spread(part.unknowns.astype(float))) // dim
         force = float(pushed[part.multipliers & normal].sum())
         if force > 0:
-            found[part.multipliers] = work[np.unique(scene.body[moving])].sum() / force
+            joined = np.unique(scene.body[moving])
+            found[part.multipliers] = 2 * energy[joined].sum() / force
     return found
 
 

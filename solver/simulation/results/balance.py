@@ -155,17 +155,14 @@ def strain_energy(state: Equilibrium) -> float:
 
     Rigid motions add none.
     """
-    energy = sum(term.energy for term in state.iterate.terms)
-    return float(work_of_forces(state).sum() / 2 + energy)
+    return float(energy_at_nodes(state).sum())
 
 
-def work_of_forces(state: Equilibrium) -> np.ndarray:
-    """Internal forces times displacements (n, dim), of which half is strain energy.
-
-    Initial strains add to that.
-    """
+def energy_at_nodes(state: Equilibrium) -> np.ndarray:
+    """The terms (n,) of that sum, each at a node of the body that has it."""
     iterate = state.iterate
-    return iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
+    work = iterate.deformation.sum(axis=0) * (iterate.internal - iterate.ground)
+    return work.sum(axis=1) / 2 + sum(term.energy for term in iterate.terms)
 
 
 def _both(

@@ -44,8 +44,8 @@ class _MixedTerm(Term):
         return self._mean.cancellation(self._stress)
 
     @property
-    def energy(self) -> float:  # type: ignore[override]
-        return -float(self._stress @ self._swelling) / 2
+    def energy(self) -> np.ndarray:
+        return self._mean.on_nodes(-self._stress * self._swelling / 2)
 
     def advanced(self, change: np.ndarray) -> _Inner:
         return self._stress + self._mean.change(change, self._defect), self._swelling

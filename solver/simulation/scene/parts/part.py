@@ -26,8 +26,8 @@ class Term:
     """Forces (n_dofs,) by what the inner unknowns violate, once these are eliminated."""
     rounded: tuple[Nodal, float] = 0.0, 0.0
     """Sizes (n,) of what `force` sums, and of stresses that are summed in double precision."""
-    energy: float = 0.0
-    """Beside the work of internal forces: strain energy in the bodies."""
+    energy: Nodal = 0.0
+    """Strain energy (n,) beside the work of internal forces, each at a node of its body."""
 
     def advanced(self, change: np.ndarray) -> Any:  # noqa: ARG002
         """The inner unknowns once the displacement changes by `change` (n_dofs,)."""

@@ -108,12 +108,12 @@ class _StrainTerm(Term):
         return -np.tensordot(self._factors, self._loads.stress, axes=1)
 
     @property
-    def energy(self) -> float:  # type: ignore[override]
+    def energy(self) -> np.ndarray:
         """½ ∫ ε₀:C:ε₀ − ∫ ε₀:C:ε."""
         moved = self._displacement.deformation.sum(axis=0)
         force = np.tensordot(self._factors, self._loads.force, axes=1)
-        own = self._factors @ self._loads.energy @ self._factors
-        return float(own / 2 - moved @ force.ravel())
+        own = np.einsum("k,nkl,l->n", self._factors, self._loads.energy, self._factors)
+        return np.asarray(own / 2 - (moved.reshape(force.shape) * force).sum(axis=1))
 
 
 class InitialStrain(ModelPart):
