@@ -254,9 +254,10 @@ def _different(kind: type[Section]) -> list[str]:
 def _null(value: object) -> Keys:
     """The keys that lead to the first one without a value; empty where there is none."""
     if isinstance(value, dict):
-        return next(((k, *_null(v)) for k, v in value.items() if v is None or _null(v)), ())
-    items = enumerate(value) if isinstance(value, list) else ()
-    return next(((i, *_null(item)) for i, item in items if _null(item)), ())
+        items = value.items()
+        return next(((k, *inner) for k, v in items if (inner := _null(v)) or v is None), ())
+    places = enumerate(value) if isinstance(value, list) else ()
+    return next(((i, *inner) for i, v in places if (inner := _null(v))), ())
 
 
 def _fits(convert: Convert, value: object, kind: Any) -> bool:

@@ -57,8 +57,8 @@ def unresolved(solution: Solution) -> str:
     caused = stress_of_motion(case, solution.scalars.length, moved)
     rounding = max(AT_REST * caused, FAINT * solution.largest_pressure)
     for given, zone in zip(case.zones, solution.zones, strict=True):
-        peak, least = zone.multiplier[zone.closed].max(initial=0.0), solution.largest_in(zone.name)
-        if zone.nodal is not None or not peak > max(rounding, LITTLE * least):
+        peak, most = zone.multiplier[zone.closed].max(initial=0.0), solution.largest_in(zone.name)
+        if zone.nodal is not None or not peak > max(rounding, LITTLE * most):
             continue
         found = scatter(solution.mesh.points, zone)
         if found > limit:

@@ -1,9 +1,9 @@
 """The accuracy of a solve by its own estimate: digits lost to rounding.
 
 Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
-into a pressure by what it acts on; it is relative to the largest pressure. Where no force acts, so
-that this is rounding itself, it is relative to the stress that strains, motions and the loads of
-other steps could cause:
+into a pressure by what it acts on; it is relative to the largest pressure. Where that
+is rounding itself, as where no force acts, it is relative to the stress that strains, motions and
+the loads of all steps could cause:
 
     forces       terms of opposite sign cancel where internal forces are summed (stretched cells,
                  nearly incompressible material), and what the solve leaves unbalanced
@@ -277,8 +277,8 @@ def estimate(
         "sums": EPSILON * terms_of(scene.blocks) * scale,
     }
     if (worst := max(errors.values())) > 10.0**-LEAST_DIGITS * scale:
-        loaded = pressure_of_forces(moving, np.full_like(noise, scene.loads.at_work.force))
-        scale = max(scale, _scale_of_rest(iterate, scale, worst, loaded))
+        _, _, size = _largest(moving)
+        scale = max(scale, _scale_of_rest(iterate, scale, worst, scene.loads.at_work.force / size))
     return Accuracy({name: error / scale for name, error in errors.items()})
 
 
@@ -296,19 +296,23 @@ def _resultants(loose: sparse.csr_matrix, sums: np.ndarray, loads: np.ndarray) -
     return np.stack([np.sqrt(squares), of_loads], axis=1)
 
 
-def _scale_of_rest(iterate: ContactIterate, pressure: float, error: float, loaded: float) -> float:
-    """What loads (`loaded`), strains or motions cause where the `pressure` is rounding; else 0.
+def _scale_of_rest(
+    iterate: ContactIterate, pressure: float, error: float, of_loads: np.ndarray
+) -> float:
+    """What loads, strains or motions cause where the largest `pressure` is rounding; else 0.
 
-    It is where it is little beside loads and no more than ten times its error.
+    `of_loads` (c,): the pressures that the largest load would cause, by row. A pressure that is
+    little beside all of them is rounding up to ten times its error.
     """
+    loaded = float(of_loads.max(initial=0.0))
     # Without loads the forces are those of initial strains.
     at_rest = not loaded or forces_of_others(iterate) > 0
     stress = stress_at_rest(iterate.scene, iterate.displacement.total)
     nothing = AT_REST * max(loaded, stress if at_rest else 0.0)
     if pressure <= nothing or (at_rest and error >= pressure) or rests(iterate):
         return max(loaded, stress, iterate.sizes.highest)
-    faint = pressure <= LITTLE * loaded and pressure <= ERRORS * error
-    return loaded if error >= pressure or faint else 0.0
+    faint = pressure <= LITTLE * of_loads.min(initial=loaded)
+    return loaded if pressure <= (ERRORS if faint else 1) * error else 0.0
 
 
 def judged(
