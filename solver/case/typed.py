@@ -252,7 +252,7 @@ def _different(kind: type[Section]) -> list[str]:
 
 
 def _null(value: object) -> Keys:
-    """The keys that lead to the first one without a value; empty where there is none."""
+    """The path to the first key that has no value; empty if every key has one."""
     if isinstance(value, dict):
         items = value.items()
         return next(((k, *inner) for k, v in items if (inner := _null(v)) or v is None), ())

@@ -1,9 +1,9 @@
 """The accuracy of a solve by its own estimate: digits lost to rounding.
 
 Each term of `Accuracy` is a size at which something is rounded, times the unit of rounding, turned
-into a pressure by what it acts on; it is relative to the largest pressure. Where that
-is rounding itself, as where no force acts, it is relative to the stress that strains, motions and
-the loads of all steps could cause:
+into a pressure by what it acts on; it is relative to the largest pressure. Where that pressure is
+itself rounding, as where no force acts, it is relative to the stress that strains, motions and the
+loads of all steps could cause:
 
     forces       terms of opposite sign cancel where internal forces are summed (stretched cells,
                  nearly incompressible material), and what the solve leaves unbalanced

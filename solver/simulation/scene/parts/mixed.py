@@ -39,7 +39,7 @@ class _MixedTerm(Term):
     def condensed(self) -> np.ndarray:  # type: ignore[override]
         return self._mean.condensed_force(self._defect)
 
-    @property
+    @cached_property
     def rounded(self) -> tuple[Nodal, float]:  # type: ignore[override]
         return self._mean.cancellation(self._stress)
 

@@ -7,6 +7,7 @@ stress.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,7 +97,7 @@ class _StrainTerm(Term):
     def __init__(self, loads: StrainLoads, factors: np.ndarray, displacement: Displacement):
         self._loads, self._factors, self._displacement = loads, factors, displacement
 
-    @property
+    @cached_property
     def rounded(self) -> tuple[Nodal, float]:  # type: ignore[override]
         stress = np.tensordot(np.abs(self._factors), np.abs(self._loads.stress), axes=1)
         return 0.0, float(stress.max())
