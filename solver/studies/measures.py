@@ -232,7 +232,9 @@ def profile(point: Point) -> Record:
     scene = build_scene(point.case, mesh_of(point.case))
     place = scene.zones[0].operator.surface.centre[:, 0] + scene.coordinates.origin[0]
     order = np.argsort(place)
-    pressure = ContactProblem(scene).solve(1.0, bilateral=point.run.bilateral).pressure
+    problem = ContactProblem(scene)
+    closed = np.where(problem.constraints.closable, 0.0, np.nan)
+    pressure = problem.solve(1.0, imposed=closed if point.run.bilateral else None).pressure
     return {"place": place[order].tolist(), "pressure": pressure[order].tolist()}
 
 

@@ -113,6 +113,15 @@ def deforming(groups):
     return ((group, each) for group, each in groups.case.materials.items() if group != "all")
 
 
+def alone(solve):
+    """The state of contact that rests is sought where no friction holds anything else."""
+
+    def without(problem, step, start=None, _imposed=None, correction=0.0, before=None):
+        return solve(problem, step, start, None, correction, before)
+
+    return without
+
+
 PLANTED = {
     "left": (problem, "find_status", without_guess),
     "memory": (friction_recovery, "_starts", forgotten),
@@ -134,6 +143,7 @@ PLANTED = {
     "cooled": (facet_gaps, "_closing", of_all),
     "idle": (scatter, "LITTLE", 0.0),
     "sideways": (accuracy, "LITTLE", 0.0),
+    "held-113": (ContactProblem, "solve", alone(ContactProblem.solve)),
 }
 
 

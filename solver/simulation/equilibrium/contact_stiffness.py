@@ -1,8 +1,10 @@
 """What contact alone sees of a system with all closed: a stiffness matrix, or its products."""
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse.linalg import LinearOperator
 
+from ...lac.errors import SolveError
 from ...mechanics.linear.symmetric_blocks import Stiffness
 from ...mechanics.linear.systems import Systems
 from .constraints import ContactConstraints
@@ -12,6 +14,8 @@ from .constraints import ContactConstraints
 _MOST_ROWS, _MOST_ITERATIVE = 4000, 400
 # A row whose jump moves a free body brings up nothing, and gets this share of its nodes' stiffness.
 _LEAST = 1e-3
+# A share of the loads: what contact pressure may leave of them on free rigid motions.
+_BALANCED = 1e-9
 # Entries of the solutions that are kept at once.
 _AT_ONCE = 1 << 23
 
@@ -53,6 +57,39 @@ def _of_slave_nodes(constraints: ContactConstraints, diagonal: np.ndarray) -> np
     soft = np.asarray(constraints.moving[rows].power(2)[:, stiff] @ (1 / diagonal[stiff]))
     soft = np.where(soft > 0, soft, soft.max(initial=0.0) or 1.0)
     return np.asarray(constraints.covered[rows] ** 2 / soft)
+
+
+def gap_stiffness(
+    systems: Systems, matrix: Stiffness, constraints: ContactConstraints, kept: np.ndarray
+) -> np.ndarray:
+    """`stiffness_of` the e multipliers that may close, with those that are `kept` (k,) closed.
+
+    Symmetric, positive semidefinite (e, e).
+    """
+    sought = constraints.closable & ~kept
+    rows = sought | kept
+    whole = stiffness_of(systems, matrix, constraints, rows)
+    return whole[np.ix_(sought[rows], sought[rows])]
+
+
+def refuse_unbalanced(
+    constraints: ContactConstraints, kept: np.ndarray, free: sparse.csr_matrix, loads: np.ndarray
+) -> None:
+    """Raise SolveError where no contact pressure balances `loads` (n_dofs,) on a free motion.
+
+    `free` (n_dofs, f): rigid motions that supports leave free; rows that are `kept` (k,) closed may
+    resist some.
+    """
+    from scipy.optimize import nnls
+
+    resisted = np.ravel(abs(constraints.gaps[kept] @ free).sum(axis=0)) > 0
+    free = free[:, ~resisted]
+    push = (constraints.gaps[constraints.closable & ~kept] @ free).toarray().T
+    # Up to round-off the loads of parts, such as initial strain, have no resultant.
+    loads = free.T @ loads
+    largest = np.abs(loads).max(initial=0.0)
+    if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
+        raise SolveError("no contact pressure balances the loads")
 
 
 def stiffness_of(

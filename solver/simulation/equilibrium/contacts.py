@@ -12,8 +12,11 @@ from scipy.sparse.linalg import LinearOperator
 
 from ...mechanics.mortar.coulomb import CoulombContact
 
-Rest = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""Which gaps (m,) touch, and the jumps (r,), where nothing presses some gaps (m,)."""
+Rest = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Which gaps (m,) touch, and the jumps (r,), where nothing presses some gaps (m,).
+
+The others keep their jumps (r,).
+"""
 
 
 class _Contact(NamedTuple):
@@ -66,7 +69,7 @@ class Contacts:
         if self._resting:
             some = np.zeros(self.m, dtype=bool)
             some[np.concatenate([self._contacts[number].gaps for number in self._resting])] = True
-            touching, jump = rest(some)
+            touching, jump = rest(some, z)
             for number in self._resting:
                 one = self._contacts[number]
                 self._resting[number], z[one.rows] = touching[one.gaps], jump[one.rows]

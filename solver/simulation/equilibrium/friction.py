@@ -91,8 +91,8 @@ class Search:
         pressure, at_work = self._where_nothing_moves(correction)
         at_rest = area * pressure[base.eligible]
 
-        def rest(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            unpressed = self._unpressed(gaps, at_work, correction)
+        def rest(gaps: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            unpressed = self._unpressed(gaps, z, at_work, correction)
             jump = (unpressed.gap - self.jump)[base.eligible]
             return unpressed.status.closed[base.eligible][: contact.m], jump
 
@@ -131,20 +131,23 @@ class Search:
         return known.pressure + change, known.at_work
 
     def _unpressed(
-        self, gaps: np.ndarray, at_work: float, correction: np.ndarray | float
+        self, gaps: np.ndarray, z: np.ndarray, at_work: float, correction: np.ndarray | float
     ) -> Equilibrium:
-        """Equilibrium without friction in which nothing presses some `gaps` (m,).
+        """Equilibrium in which nothing presses some `gaps` (m,), without friction there.
 
-        A body that its loads have left may be in many places: this one touches another body. Raises
-        SolveError if the search without friction finds no such state.
+        The others, of other bodies, keep what they have of z (r,). A body that its loads have left
+        may be in many places: this one touches another body. Raises SolveError if the search
+        without friction finds no such state.
         """
         base = self.problem.constraints
+        kept = self._of_all(self._contact.kept(~gaps))
+        imposed = np.where(kept, self.jump + self._of_all(z), np.nan)
         try:
-            found = self.problem.solve(self.step, self.closed, correction=correction)
+            found = self.problem.solve(self.step, self.closed, imposed, correction)
         except SolveError:
             raise SolveError(self._why_none()) from None
         # Where all others may bear tension up to their limit, one may bear what balances them.
-        limit = max(int(found.status.closed.sum()), 1) * found.trial.pressure_limit
+        limit = max(int((found.status.closed & ~kept).sum()), 1) * found.trial.pressure_limit
         pressed = base.covered * np.maximum(found.pressure - limit, 0.0)
         if (pressed[base.eligible][: len(gaps)][gaps] > AT_REST * at_work).any():
             raise SolveError(self._why_none())
@@ -153,7 +156,8 @@ class Search:
     def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
         """Equilibrium in which nothing presses, so that nothing rubs."""
         base, everywhere = self.problem.constraints, np.ones(self._contact.m, dtype=bool)
-        found = self._unpressed(everywhere, at_work, correction)
+        nowhere = np.zeros(int(base.eligible.sum()))
+        found = self._unpressed(everywhere, nowhere, at_work, correction)
         none = np.zeros_like(found.pressure)
         trial = replace(found.trial, pressure=none, gap=found.gap - self.jump)
         closed = found.status.closed[base.eligible][: self._contact.m]

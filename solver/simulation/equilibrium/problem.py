@@ -31,7 +31,7 @@ from .constraints import (
     moved,
     refuse_unsolvable,
 )
-from .contact_stiffness import contact_stiffness, stiffness_of
+from .contact_stiffness import contact_stiffness, gap_stiffness, refuse_unbalanced
 from .iterate import ContactIterate
 from .rest import AT_REST
 from .state import Equilibrium
@@ -47,8 +47,6 @@ _CORRECTED = 4.0
 # A body that is moved, and hardly strained: below this share of what its motion would bring up
 # where it is imposed, the forces that are left are the scale, and it is solved once more.
 _MOVED = 1e-3
-# A share of the loads: what contact pressure may leave of them on free rigid motions.
-_BALANCED = 1e-9
 SINGLE_FROM = 1_000_000
 """Degrees of freedom from which the stiffness is stored in single precision where multigrid solves:
 it takes half the memory, and refinement, by residuals of the cells in double precision, two steps
@@ -137,36 +135,44 @@ class ContactProblem:
         self,
         step: Step,
         start: np.ndarray | None = None,
-        bilateral: bool = False,
+        imposed: np.ndarray | None = None,
         correction: np.ndarray | float = 0.0,
         before: Step | None = None,
     ) -> Equilibrium:
         """Equilibrium at a step, the status search starting from `start` (k,), a guess.
 
-        `before`: the step that `start` is the status of, if it is another one. `bilateral`: no
-        status is sought, all macro-elements stay closed, in tension too. `correction` (n, dim): see
-        `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0, ḡ ≥ 0, p ḡ = 0, or a system
-        is singular.
+        `before`: the step that `start` is the status of, if it is another one. `imposed` (k,): mean
+        gaps and slips that some rows keep, in tension too; NaN in those whose status is sought.
+        `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
+        ḡ ≥ 0, p ḡ = 0, or a system is singular.
         """
-        scene, eligible = self.scene, self.constraints.closable
-        if bilateral:
-            return self.equilibrium(step, eligible, correction)
+        scene, eligible, constraints = self.scene, self.constraints.closable, self.constraints
+        kept = np.zeros(len(eligible), dtype=bool)
+        if imposed is not None:
+            kept = ~np.isnan(imposed)
+            constraints = constraints.with_jumps(np.where(kept, imposed, 0.0))
+        eligible = eligible & ~kept
+
+        def free_motion(closed: np.ndarray) -> str:
+            return self.free_motion(closed | kept)
+
         guess: Callable[[], np.ndarray] | None
-        guess = partial(first_guess, scene, self.constraints, step, self.free_motion)
+        guess = partial(first_guess, scene, constraints, step, free_motion)
         if self._gives_way or not scene.options.shortcuts.status:
             start = eligible
         elif start is None:
             start, guess = guess(), None
         elif before is not None:
-            start = moved(start, before, step, scene, self.constraints, self.free_motion)
+            start = moved(start, before, step, scene, constraints, free_motion)
         latest: list[Equilibrium] = []
         rough, known = scene.options.shortcuts.status, None
 
         def attempt(closed: np.ndarray) -> Trial:
             nonlocal known
+            closed = closed | kept
             if not scene.options.shortcuts.status:
                 self._systems.forget()
-            first = rest = self._at_rest(closed, step, correction)
+            first = rest = self._at_rest(closed, step, correction, constraints)
             if rough and self._systems.closed(closed).factor.iterative:
                 known, trial = self._roughly(rest, known)
                 if (eligible & (trial.violation(closed) > 1)).any():
@@ -178,13 +184,13 @@ class ContactProblem:
         def stiffness() -> np.ndarray:
             nonlocal rough
             rough = False
-            return self._gap_stiffness(step)
+            return self._gap_stiffness(step, kept)
 
         area, confirm = self.constraints.covered, not scene.options.shortcuts.status
         status = find_status(attempt, start, eligible, area, stiffness, confirm, guess)
         trial = latest[0].trial
         touching = self.constraints.unloaded & (trial.gap <= trial.gap_limit)
-        return replace(latest[0], status=replace(status, closed=status.closed | touching))
+        return replace(latest[0], status=replace(status, closed=status.closed | kept | touching))
 
     def equilibrium(
         self, step: Step, closed: np.ndarray, correction: np.ndarray | float
@@ -367,22 +373,11 @@ class ContactProblem:
             iterate, rounded, pressure, diagonal, self._rough, self.unsupported, residual, scale
         )
 
-    def _gap_stiffness(self, step: Step) -> np.ndarray:
-        """The forces (e, e) that average gaps bring up, each imposed with all others closed.
-
-        Of the e multipliers that may close; symmetric, positive semidefinite. Raises SolveError
-        where no contact pressure balances the loads on a rigid motion that supports leave free.
-        """
-        from scipy.optimize import nnls
-
-        eligible = self.constraints.closable
-        push = (self.constraints.gaps[eligible] @ self.unsupported).toarray().T
-        # Up to round-off the loads of parts, such as initial strain, have no resultant.
-        loads = self.unsupported.T @ self.scene.given_loads(step)[0].ravel()
-        largest = np.abs(loads).max(initial=0.0)
-        if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
-            raise SolveError("no contact pressure balances the loads")
-        return stiffness_of(self._systems, self.matrix, self.constraints, eligible)
+    def _gap_stiffness(self, step: Step, kept: np.ndarray) -> np.ndarray:
+        """See `gap_stiffness`; raises SolveError as `refuse_unbalanced` does."""
+        loads = self.scene.given_loads(step)[0].ravel()
+        refuse_unbalanced(self.constraints, kept, self.unsupported, loads)
+        return gap_stiffness(self._systems, self.matrix, self.constraints, kept)
 
     def contact_stiffness(self) -> tuple[np.ndarray | LinearOperator, np.ndarray]:
         """See `contact_stiffness`; made once, for all steps."""
