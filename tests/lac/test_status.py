@@ -196,6 +196,20 @@ def test_a_body_that_is_let_go_is_caught_by_the_fallback():
     assert result.closed.tolist() == [False, True, True]
 
 
+def test_a_body_that_nothing_presses_touches_one_of_two_stops():
+    """It is 3 shorter than what is between them: fitted by tension, or free if it touches none."""
+    matrix = np.ones((2, 2))
+
+    def solve(closed):
+        if not closed.any():
+            raise SolveError("nothing keeps the body")
+        pressure = np.full(2, -3.0 if closed.all() else 0.0)
+        return trial(pressure, np.where(closed, 0.0, 3.0))
+
+    result = searched(solve, np.full(2, True), stiffness=lambda: matrix)
+    assert result.closed.sum() == 1
+
+
 # Macro-elements of length 1 with gaps 0, 1, 2 … under a force that brings the bodies 2.5 nearer.
 def test_the_guess_in_the_plane_is_the_force_over_the_stiffness():
     gap, area, eligible = np.arange(5.0), np.ones(5), np.full(5, True)

@@ -146,12 +146,8 @@ class ContactProblem:
         `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
         ḡ ≥ 0, p ḡ = 0, or a system is singular.
         """
-        scene, eligible, constraints = self.scene, self.constraints.closable, self.constraints
-        kept = np.zeros(len(eligible), dtype=bool)
-        if imposed is not None:
-            kept = ~np.isnan(imposed)
-            constraints = constraints.with_jumps(np.where(kept, imposed, 0.0))
-        eligible = eligible & ~kept
+        scene, (kept, constraints) = self.scene, self._keeping(imposed)
+        eligible = constraints.closable & ~kept
 
         def free_motion(closed: np.ndarray) -> str:
             return self.free_motion(closed | kept)
@@ -191,6 +187,13 @@ class ContactProblem:
         trial = latest[0].trial
         touching = self.constraints.unloaded & (trial.gap <= trial.gap_limit)
         return replace(latest[0], status=replace(status, closed=status.closed | kept | touching))
+
+    def _keeping(self, imposed: np.ndarray | None) -> tuple[np.ndarray, ContactConstraints]:
+        """Which rows (k,) keep what is `imposed`, and the constraints with that."""
+        if imposed is None:
+            return np.zeros(len(self.constraints.area), dtype=bool), self.constraints
+        kept = ~np.isnan(imposed)
+        return kept, self.constraints.with_jumps(np.where(kept, imposed, 0.0))
 
     def equilibrium(
         self, step: Step, closed: np.ndarray, correction: np.ndarray | float

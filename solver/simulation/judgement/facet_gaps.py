@@ -29,6 +29,8 @@ _EDGE = np.cos(np.radians(25))
 # Gaps of mesh and case agree where they differ by less than this share of what facets may miss;
 # bodies whose gap is smaller touch.
 _FITS = 1e-3
+# So many faces at most are as near to a place as others: those around a vertex.
+_AS_NEAR = 8
 # The mean over a face of what it misses, over κ R² / 2 with the κ seen at its vertices, by order:
 # 1 − |x − c|² / R² for linear lines and quadrangles (3/4 on triangles), (1 − r²) r² / 2 for arcs.
 _MEAN = {1: 2 / 3, 2: 2 / 15}
@@ -146,8 +148,8 @@ def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
     rise, depth = slave.rise, np.abs(slave.rise)
     if zone.zone.master not in scene.case.surfaces:
         master = _bend(scene.points, zone.master_faces)
-        _, near = cKDTree(master.middle).query(slave.middle)
-        rise, depth = rise + master.rise[near], depth + np.abs(master.rise[near])
+        opposite = _nearest(slave.middle, master.middle)
+        rise, depth = rise + opposite @ master.rise, depth + opposite @ np.abs(master.rise)
     apart = operator.initial + zone.zone.interference * operator.covered
     if not (np.abs(apart) > _FITS * depth.max() * operator.covered).any():
         return None  # the facets of both sides lie on one another
@@ -157,6 +159,19 @@ def _missed(scene: Scene, zone: ZoneScene) -> _Missed | None:
     by_macro[:, number] = rise, depth
     gap = around @ by_macro[0] / np.asarray(around.sum(axis=1)).ravel()
     return _Missed(gap, by_macro[1])
+
+
+def _nearest(places: np.ndarray, middle: np.ndarray) -> sparse.csr_matrix:
+    """The mean (n, f) of values (f,) over the faces nearest to places (n, dim): all that tie.
+
+    >>> _nearest(np.zeros((1, 2)), np.array([[1.0, 0], [0, -1.0], [3.0, 0]])).toarray().tolist()
+    [[0.5, 0.5, 0.0]]
+    """
+    most = np.arange(1, min(_AS_NEAR, len(middle)) + 1)
+    distance, face = cKDTree(middle).query(places, most)
+    i, j = np.nonzero(distance <= (1 + FLAT) * distance[:, :1])
+    shares = 1 / np.bincount(i)[i]
+    return sparse.csr_matrix((shares, (i, face[i, j])), shape=(len(places), len(middle)))
 
 
 def _bend(points: np.ndarray, blocks: Sequence[FaceBlock]) -> _Bend:
