@@ -1,10 +1,13 @@
 """Contact without tension and overlap, whatever the units, loads, zones and stiffnesses."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from solver.case.reader import parse_case
 from solver.lac.errors import SolveError
@@ -13,6 +16,7 @@ from solver.mechanics.linear.choice import MULTIGRID
 from solver.mechanics.mortar.treatments import TREATMENTS
 from solver.mesh import generate
 from solver.simulation.equilibrium import contact_stiffness, problem
+from solver.simulation.equilibrium.contact_stiffness import refuse_unbalanced
 from solver.simulation.equilibrium.problem import ContactProblem
 from solver.simulation.judgement.consistency import inconsistency
 from solver.simulation.scene.scene import build_scene
@@ -215,6 +219,16 @@ def test_what_gaps_bring_up_is_what_opening_takes_away(bent):
         stiffness @ state.gap + area * closed, abs=1e-10 * closed.max()
     )
     assert stiffness == pytest.approx(stiffness.T, abs=1e-11 * stiffness.max())
+
+
+@pytest.mark.parametrize(("kept", "lost"), [(False, True), (True, False)])
+def test_loads_along_a_surface_are_balanced_by_what_is_kept_alone(kept, lost):
+    """One row sees y and may close, another one sees x and is kept or not: a load acts along x."""
+    gaps, loads = sparse.csr_array([[0.0, 1.0], [1.0, 0.0]]), np.array([1.0, 0.0])
+    rows = SimpleNamespace(gaps=gaps, closable=np.array([True, False]))
+    free = sparse.csc_array([[1.0], [0.0]])
+    with pytest.raises(SolveError, match="balances the loads") if lost else nullcontext():
+        refuse_unbalanced(rows, np.array([False, kept]), free, loads)
 
 
 @pytest.mark.parametrize(

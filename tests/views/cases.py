@@ -76,10 +76,12 @@ def by_body(materials: Case) -> Case:
 
 
 def move_planes(case: Case, by: list[float]) -> None:
-    """Move the planes of groups and rigid bodies."""
+    """Move the planes of groups and rigid bodies, and the reference points of these."""
     places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]
-    for plane in (place["plane"] for place in places if "plane" in place):
-        plane["point"] = [x + d for x, d in zip(plane["point"], by, strict=True)]
+    planes = [place["plane"] for place in places if "plane" in place]
+    for each, key in [*((p, "point") for p in planes), *((p, "reference") for p in places)]:
+        if key in each:
+            each[key] = [x + d for x, d in zip(each[key], by, strict=True)]
 
 
 def _mesh(r: Random, dim: int) -> Case:

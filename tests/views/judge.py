@@ -93,11 +93,12 @@ def in_another_order(case: Case) -> Case:
 def in_other_units(case: Case) -> Case:
     """The case with lengths, and stresses, forces and stiffnesses in smaller units."""
     dim = len(case["mesh"]["bottom"]["divisions"])
-    units = dict.fromkeys(("fix", "move", "point", "interference", "clearance"), LENGTHS)
+    lengths = "fix", "move", "point", "reference", "interference", "clearance"
+    units = dict.fromkeys(lengths, LENGTHS)
     units |= dict.fromkeys(("young", "pressure", "traction"), UNITS)
     units |= dict.fromkeys(("body_force", "spring"), UNITS / LENGTHS)
     across = 2 if case.get("plane") == "axisymmetric" else dim - 1
-    units["force"] = UNITS * LENGTHS**across
+    units |= {"force": UNITS * LENGTHS**across, "rz": UNITS * LENGTHS ** (across + 1)}  # a moment
     same = {key: value for key, value in case.items() if key in ("mesh", "steps")}
     scaled = {"scale": LENGTHS} | case.get("transform", {})
     return _in_units(case, units) | same | {"transform": scaled}

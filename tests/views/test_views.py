@@ -122,6 +122,11 @@ def alone(solve):
     return without
 
 
+def all_or_none(_problem, zones, recover):
+    """No pressure is recovered where that of one contact does not settle."""
+    return recover(zones)
+
+
 PLANTED = {
     "left": (problem, "find_status", without_guess),
     "memory": (friction_recovery, "_starts", forgotten),
@@ -143,7 +148,8 @@ PLANTED = {
     "cooled": (facet_gaps, "_closing", of_all),
     "idle": (scatter, "LITTLE", 0.0),
     "sideways": (accuracy, "LITTLE", 0.0),
-    "held-113": (ContactProblem, "solve", alone(ContactProblem.solve)),
+    "held": (ContactProblem, "solve", alone(ContactProblem.solve)),
+    "settles": (friction_recovery, "by_contact", all_or_none),
 }
 
 

@@ -87,8 +87,8 @@ def refuse_unbalanced(
     push = (constraints.gaps[constraints.closable & ~kept] @ free).toarray().T
     # Up to round-off the loads of parts, such as initial strain, have no resultant.
     loads = free.T @ loads
-    largest = np.abs(loads).max(initial=0.0)
-    if largest and nnls(push / np.abs(push).max(), -loads / largest)[1] > _BALANCED:
+    largest, unit = (np.abs(each).max(initial=0.0) for each in (loads, push))
+    if largest and (not unit or nnls(push / unit, -loads / largest)[1] > _BALANCED):
         raise SolveError("no contact pressure balances the loads")
 
 

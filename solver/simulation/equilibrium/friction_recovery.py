@@ -18,11 +18,18 @@ from scipy import sparse
 from ...case.acting import Step
 from ...lac.errors import SolveError
 from ...lac.friction import of_tractions
-from ...lac.recovery import SETTLED, Recovery, settled_means, unsettled
+from ...lac.recovery import SETTLED, settled_means, unsettled
 from ..scene.scene import ZoneScene
 from .friction import Search
 from .problem import ContactProblem
-from .recovery import ZoneFit, fit_of, largest_of_joined, most_sweeps, with_estimate
+from .recovery import (
+    ZoneFit,
+    by_contact,
+    fit_of,
+    largest_of_joined,
+    most_sweeps,
+    with_estimate,
+)
 from .state import Equilibrium
 
 _LOG = logging.getLogger(__name__)
@@ -100,41 +107,44 @@ def solve_and_recover(
 ) -> Equilibrium:
     """Equilibrium at a step after the state `before`, with its recovered pressure by zone.
 
-    Where the state does not settle under the correction, it stays as it is and no pressure is
-    recovered, in the steps that follow neither. Raises SolveError where there is no equilibrium.
+    Where the state of a contact does not settle under the correction, its pressure stays constant
+    by face, in the steps that follow too. Raises SolveError where there is no equilibrium.
     """
-    search, zones = Search(problem, step, before), problem.scene.zones
-    given = [(zone, zone.operator.recovery) for zone in zones if zone.operator.recovery]
-    recovering = [zone for zone, _ in given]
-    most = most_sweeps(recovering)
-    if not most:
-        return with_estimate(recovering, search.settled())
-    for start in _starts(given, before):
-        sweeping = _Sweeping(search, recovering, start)
-        try:
-            return sweeping.settled(most)
-        except SolveError:
-            continue
-    state = search.settled()
-    _LOG.info("recovery: the state does not settle; pressure and traction stay constant by face")
-    return with_estimate(recovering, state)
+    search = Search(problem, step, before)
+    given = [zone for zone in problem.scene.zones if zone.operator.recovery]
+    going = [zone for zone in given if not _constant(zone, before)]
+
+    def recover(zones: list[ZoneScene]) -> Equilibrium | None:
+        most = most_sweeps(zones)
+        for start in _starts(zones, before) if most else ():
+            try:
+                return _Sweeping(search, zones, start).settled(most)
+            except SolveError:
+                continue
+        return None
+
+    found = by_contact(problem, going, recover) if most_sweeps(given) else None
+    if found is None:
+        found = search.settled()
+        if most_sweeps(given):
+            _LOG.info("recovery: the state does not settle; pressure and traction stay constant")
+    return with_estimate(given, found)
 
 
-def _starts(
-    given: Sequence[tuple[ZoneScene, Recovery]], before: Equilibrium | None
-) -> list[Equilibrium | None]:
-    """What sweeps go on from: the last step, where its axes are those of now, then nothing at all.
+def _constant(zone: ZoneScene, before: Equilibrium | None) -> bool:
+    """Whether a zone had constants in the last step in place of a recovered pressure."""
+    field, recovery = before and before.fields.get(zone.zone.name), zone.operator.recovery
+    return bool(field and recovery and field.form != recovery.form.name)
 
-    Empty where that step has constants in place of a recovered pressure.
-    """
-    if before is None:
-        return [None]
-    pairs = [(recovery, before.fields.get(zone.zone.name)) for zone, recovery in given]
-    if any(field and field.form != recovery.form.name for recovery, field in pairs):
-        return []
-    for recovery, field in pairs:
+
+def _starts(zones: Sequence[ZoneScene], before: Equilibrium | None) -> list[Equilibrium | None]:
+    """What sweeps go on from: the last step, where its axes are those of now, then nothing."""
+    for zone in zones:
+        field, recovery = before and before.fields.get(zone.zone.name), zone.operator.recovery
+        if not field or not recovery:
+            return [None]
         axes = recovery.moments.local.axes
-        if not field or np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
+        if np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
             return [None]
     return [before, None]
 

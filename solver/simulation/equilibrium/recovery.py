@@ -5,7 +5,7 @@ in full, so that means and loads are in equilibrium with the displacement.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -73,9 +73,44 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
     is recovered, but the error of the constants is estimated.
     """
     given = [zone for zone in problem.scene.zones if zone.operator.recovery]
-    most = most_sweeps(given)
-    if not most or not state.status.closed.any():
+    if not most_sweeps(given) or not state.status.closed.any():
         return with_estimate(given, state)
+
+    def recover(zones: list[ZoneScene]) -> Equilibrium | None:
+        return _recovered(problem, state, step, zones)
+
+    found = by_contact(problem, given, recover)
+    if found is None:
+        _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
+    return with_estimate(given, found or state)
+
+
+def by_contact(
+    problem: ContactProblem,
+    zones: list[ZoneScene],
+    recover: Callable[[list[ZoneScene]], Equilibrium | None],
+) -> Equilibrium | None:
+    """What `recover` finds with all zones, or with those of the contacts that settle by themselves.
+
+    None where none does.
+    """
+    if (found := recover(zones)) is not None:
+        return found
+    contacts = [
+        [zone for zone in zones if part.multipliers[zone.numbers].any()] for part in problem.parts
+    ]
+    contacts = [contact for contact in contacts if contact]
+    if len(contacts) < 2:
+        return None
+    settled = [zone for contact in contacts if recover(contact) for zone in contact]
+    return recover(settled) if settled else None
+
+
+def _recovered(
+    problem: ContactProblem, state: Equilibrium, step: Step, given: list[ZoneScene]
+) -> Equilibrium | None:
+    """The equilibrium under the recovered pressure of the zones given; None where none settles."""
+    most = most_sweeps(given)
 
     def correct(state: Equilibrium) -> _Corrected | None:
         fits = [fit_of(zone, state.status.closed) for zone in given]
@@ -89,10 +124,9 @@ def recovered(problem: ContactProblem, state: Equilibrium, step: Step) -> Equili
         closed = found.state.status.closed
         return problem.solve(step, closed, correction=found.state.correction)
 
-    found = with_status(state, correct, wrong, again)
+    found = with_status(state, correct, wrong, again) if most else None
     if found is None:
-        _LOG.info("recovery: status or pressure do not settle; the pressure stays constant by face")
-        return with_estimate(given, state)
+        return None
     fields = {
         zone.zone.name: fit.field(fit.coefficients(found.state.pressure), force)
         for zone, fit, force in zip(given, found.zones, found.forces, strict=True)
@@ -117,12 +151,13 @@ def largest_of_joined(problem: ContactProblem, pressure: np.ndarray) -> np.ndarr
 
 
 def with_estimate(zones: Sequence[ZoneScene], state: Equilibrium) -> Equilibrium:
-    """The state with the error of its constants, by a reconstruction that is not applied."""
-    fields, nothing = {}, np.zeros(state.correction.size)
+    """The state with the error of constants not recovered, by a reconstruction not applied."""
+    fields, nothing = dict(state.fields), np.zeros(state.correction.size)
     for zone in zones if state.status.closed.any() else ():
-        fit = fit_of(zone, state.status.closed)
-        field = fit.field(fit.coefficients(state.pressure), nothing)
-        fields[zone.zone.name] = replace(field, form="none")
+        if zone.zone.name not in fields:
+            fit = fit_of(zone, state.status.closed)
+            field = fit.field(fit.coefficients(state.pressure), nothing)
+            fields[zone.zone.name] = replace(field, form="none")
     return replace(state, fields=fields)
 
 
