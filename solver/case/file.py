@@ -191,7 +191,8 @@ class Zone(Section, frozen=True):
     normal: the direction of gaps: normals of the slave's faces, their means at its nodes, or the
       normals of a plane or smooth master
     recovery: how a pressure of higher order is recovered from the constants
-    sweeps: at most so many solves with the loads of the recovered pressure, until it settles
+    sweeps: at most so many solves with the loads of the recovered pressure, until it settles; of
+      several zones the largest number counts
     stabilised: contact gives way to pressures that scatter from face to face
     friction: Coulomb's coefficient of friction; the steps are then a path
     interference: initial overlap of bodies that are modelled without it; subtracted from the gap
