@@ -70,7 +70,7 @@ _LOG = logging.getLogger(__name__)
 _OUTCOME = 25
 # Stop the active-set search when this many solves make no progress.
 _PATIENCE = 8
-# At most this many may close in one iteration when few are closed.
+# At most this many may close in one iteration when few are closed, or hold a body that is free.
 _FEW = 50
 _MAX_CORRECTIONS = 6
 
@@ -270,7 +270,8 @@ def _touching(solve: Solve, closed: np.ndarray, gap: np.ndarray) -> tuple[Trial,
 
     Loads are in balance here: a body that nothing presses may be anywhere among its neighbours.
     """
-    for nearest in np.argsort(gap, kind="stable")[np.count_nonzero(gap <= 0) :]:
+    apart = np.argsort(gap, kind="stable")[np.count_nonzero(gap <= 0) :]
+    for nearest in apart[:_FEW]:
         try:
             return solve(closed), closed
         except SolveError:
