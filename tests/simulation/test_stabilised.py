@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from solver import solve_case
+from solver.lac.errors import SolveError
+from solver.simulation.equilibrium.problem import ContactProblem
 from tests.patches import force_solver
+from tests.views.cases import FOUND
 
 STIFF = {"bottom": ("QUAD4", 16), "top": ("QUAD4", 8), "young": (1e5, 1e3)}
 """A fine, stiff slave on a coarse, soft master."""
@@ -160,3 +163,15 @@ def test_the_plan_tells_the_gaps_that_it_leaves():
 def test_the_pressures_are_those_of_a_factor(treatment):
     case = waves(("HEXA8", 6), ("HEXA8", 3), (1e3, 1e4), treatment=treatment)
     check_like_a_factor(case, 0.3, 1e-10)
+
+
+@pytest.mark.parametrize(("steps", "word"), [([0.0], "solved"), ([1.0], "")])
+def test_contact_that_bears_nothing_has_no_status_to_settle(monkeypatch, steps, word):
+    """Above contact with friction, whose search finds it anew where its status changes."""
+    monkeypatch.setattr(ContactProblem, "gives_way_where", lambda _problem, _pressed: True)
+    case = FOUND["faint"] | {"steps": steps}
+    if word:
+        assert solve_case(case).verdict == word
+        return
+    with pytest.raises(SolveError, match="stabilised contact does not settle"):
+        solve_case(case)

@@ -72,15 +72,22 @@ class Search:
         """Equilibrium under the forces `correction` (n, dim) beside those of the constants.
 
         To the last digits, or to some if it is `on_the_way` to another one. Raises SolveError where
-        none is found. Contact that gives way does so where it stays closed.
+        none is found. Contact that gives way does so where it stays closed and is pressed.
         """
         for _ in range(_ROUNDS):
             found = self._settled(correction, on_the_way)
-            if not self.problem.gives_way_where(found.status.closed):
+            if not self._pressed(found) or not self.problem.gives_way_where(found.status.closed):
                 return found
             self._unmoved = None
             del self._contact
         raise SolveError("the status of stabilised contact does not settle")
+
+    def _pressed(self, found: Equilibrium) -> bool:
+        """Whether contact bears more than what rounding may leave of the forces at work."""
+        assert self._unmoved is not None
+        base = self.problem.constraints
+        forces = (base.covered * found.pressure)[base.normal]
+        return bool(forces.max(initial=0.0) > FAINT * self._unmoved.at_work)
 
     def _settled(self, correction: np.ndarray | float, on_the_way: bool) -> Equilibrium:
         base, contact = self.problem.constraints, self._contact
