@@ -165,13 +165,9 @@ def test_the_pressures_are_those_of_a_factor(treatment):
     check_like_a_factor(case, 0.3, 1e-10)
 
 
-@pytest.mark.parametrize(("steps", "word"), [([0.0], "solved"), ([1.0], "")])
-def test_contact_that_bears_nothing_has_no_status_to_settle(monkeypatch, steps, word):
+def test_contact_that_bears_nothing_has_no_status_to_settle(monkeypatch):
     """Above contact with friction, whose search finds it anew where its status changes."""
     monkeypatch.setattr(ContactProblem, "gives_way_where", lambda _problem, _pressed: True)
-    case = FOUND["faint"] | {"steps": steps}
-    if word:
-        assert solve_case(case).verdict == word
-        return
+    assert solve_case(FOUND["faint"] | {"steps": [0.0]}).verdict == "solved"
     with pytest.raises(SolveError, match="stabilised contact does not settle"):
-        solve_case(case)
+        solve_case(FOUND["faint"] | {"steps": [1.0]})

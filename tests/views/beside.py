@@ -12,7 +12,7 @@ import numpy as np
 from solver.case.reader import parse_case
 from solver.verification.run import mesh_of
 
-from .cases import Case, by_body, drawn, move_planes
+from .cases import Case, by_body, drawn, move_places
 
 OTHER = "other_"
 """Groups, zones and bodies of the other case begin with this."""
@@ -53,7 +53,7 @@ def beside(case: Case, other: Case) -> tuple[Case, meshio.Mesh, int]:
     by = np.zeros(meshes[1].points.shape[1])
     by[dim - 1] = _AWAY
     one, two = _of_bodies(case), _named(_of_bodies(other))
-    move_planes(two, by[:dim].tolist())
+    move_places(two, by[:dim].tolist())
     lists = {
         key: [*one.get(key, []), *two.get(key, [])] for key in ("supports", "loads", "contact")
     }

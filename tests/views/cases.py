@@ -75,13 +75,12 @@ def by_body(materials: Case) -> Case:
     return {"bottom": whole, "top": whole} if whole else materials
 
 
-def move_planes(case: Case, by: list[float]) -> None:
+def move_places(case: Case, by: list[float]) -> None:
     """Move the planes of groups and rigid bodies, and the reference points of these."""
-    places = [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]
-    planes = [place["plane"] for place in places if "plane" in place]
-    for each, key in [*((p, "point") for p in planes), *((p, "reference") for p in places)]:
-        if key in each:
-            each[key] = [x + d for x, d in zip(each[key], by, strict=True)]
+    for place in [*case.get("bodies", {}).values(), *case.get("groups", {}).values()]:
+        for each, key in ((place.get("plane", {}), "point"), (place, "reference")):
+            if key in each:
+                each[key] = [x + d for x, d in zip(each[key], by, strict=True)]
 
 
 def _mesh(r: Random, dim: int) -> Case:

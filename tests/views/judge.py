@@ -17,7 +17,7 @@ from solver.simulation.results.solution import ZoneResult
 from solver.system.errors import InputError
 
 from .beside import OTHER, beside, meshed, others
-from .cases import Case, by_body, move_planes
+from .cases import Case, by_body, move_places
 
 # Stresses in other units are so many times as large, lengths too.
 UNITS, LENGTHS = 1e6, 1e-3
@@ -78,7 +78,7 @@ def elsewhere(case: Case) -> Case:
     if not along and not around:
         moves["rotate"] = angle if dim == 2 else {"axis": axis, "angle": angle}
     moves["translate"] = by = [r.uniform(-2.0, 2.0) * (k > 0 or not around) for k in range(dim)]
-    move_planes(found, by)
+    move_places(found, by)
     return found
 
 

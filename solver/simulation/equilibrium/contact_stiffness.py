@@ -59,32 +59,18 @@ def _of_slave_nodes(constraints: ContactConstraints, diagonal: np.ndarray) -> np
     return np.asarray(constraints.covered[rows] ** 2 / soft)
 
 
-def gap_stiffness(
-    systems: Systems, matrix: Stiffness, constraints: ContactConstraints, kept: np.ndarray
-) -> np.ndarray:
-    """`stiffness_of` the e multipliers that may close, with those that are `kept` (k,) closed.
-
-    Symmetric, positive semidefinite (e, e).
-    """
-    sought = constraints.closable & ~kept
-    rows = sought | kept
-    whole = stiffness_of(systems, matrix, constraints, rows)
-    return whole[np.ix_(sought[rows], sought[rows])]
-
-
 def refuse_unbalanced(
-    constraints: ContactConstraints, kept: np.ndarray, free: sparse.csr_matrix, loads: np.ndarray
+    sought: sparse.csr_matrix, kept: sparse.csr_matrix, free: sparse.csc_matrix, loads: np.ndarray
 ) -> None:
     """Raise SolveError where no contact pressure balances `loads` (n_dofs,) on a free motion.
 
-    `free` (n_dofs, f): rigid motions that supports leave free; rows that are `kept` (k,) closed may
-    resist some.
+    `sought` (e, n_dofs): the rows of gaps that pressures act on; `kept` (j, n_dofs): those that
+    resist whatever they see; `free` (n_dofs, f): rigid motions that supports leave free.
     """
     from scipy.optimize import nnls
 
-    resisted = np.ravel(abs(constraints.gaps[kept] @ free).sum(axis=0)) > 0
-    free = free[:, ~resisted]
-    push = (constraints.gaps[constraints.closable & ~kept] @ free).toarray().T
+    free = free[:, np.ravel(abs(kept @ free).sum(axis=0)) == 0]
+    push = (sought @ free).toarray().T
     # Up to round-off the loads of parts, such as initial strain, have no resultant.
     loads = free.T @ loads
     largest, unit = (np.abs(each).max(initial=0.0) for each in (loads, push))
@@ -93,14 +79,22 @@ def refuse_unbalanced(
 
 
 def stiffness_of(
-    systems: Systems, matrix: Stiffness, constraints: ContactConstraints, rows: np.ndarray
+    systems: Systems,
+    matrix: Stiffness,
+    constraints: ContactConstraints,
+    rows: np.ndarray,
+    kept: np.ndarray | bool = False,
 ) -> np.ndarray:
-    """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed."""
-    system, area = systems.factored(rows), constraints.covered[rows]
-    found, size = np.zeros((len(area), len(area))), matrix.shape[0]
+    """The forces (e, e) that average gaps and slips in e `rows` bring up, all others closed.
+
+    Those that are `kept` (k,) are closed too.
+    """
+    closed = rows | kept
+    system, area, mine = systems.factored(closed), constraints.covered[rows], rows[closed]
+    found, size, at = np.zeros((len(area), len(area))), matrix.shape[0], np.flatnonzero(mine)
     for some in np.array_split(np.arange(len(area)), 1 + len(area) * size // _AT_ONCE):
-        imposed = np.zeros((len(area), len(some)))
-        imposed[some, np.arange(len(some))] = area[some]
+        imposed = np.zeros((len(mine), len(some)))
+        imposed[at[some], np.arange(len(some))] = area[some]
         change = system.correction(np.zeros((size, len(some))), imposed)
-        found[:, some] = area[:, None] * system.multiplier(-(matrix @ change))
+        found[:, some] = area[:, None] * system.multiplier(-(matrix @ change))[mine]
     return found

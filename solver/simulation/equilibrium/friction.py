@@ -76,13 +76,13 @@ class Search:
         """
         for _ in range(_ROUNDS):
             found = self._settled(correction, on_the_way)
-            if not self._pressed(found) or not self.problem.gives_way_where(found.status.closed):
+            if not self._bears(found) or not self.problem.gives_way_where(found.status.closed):
                 return found
             self._unmoved = None
             del self._contact
         raise SolveError("the status of stabilised contact does not settle")
 
-    def _pressed(self, found: Equilibrium) -> bool:
+    def _bears(self, found: Equilibrium) -> bool:
         """Whether contact bears more than what rounding may leave of the forces at work."""
         assert self._unmoved is not None
         base = self.problem.constraints

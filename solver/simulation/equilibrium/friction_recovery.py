@@ -30,7 +30,7 @@ from .recovery import (
     most_sweeps,
     with_estimate,
 )
-from .state import Equilibrium
+from .state import Equilibrium, PressureField
 
 _LOG = logging.getLogger(__name__)
 # Axes of macro-elements that differ by less, as a share of them, are the same.
@@ -115,15 +115,14 @@ def solve_and_recover(
     going = [zone for zone in given if not _constant(zone, before)]
 
     def recover(zones: list[ZoneScene]) -> Equilibrium | None:
-        most = most_sweeps(zones)
-        for start in _starts(zones, before) if most else ():
+        for start in _starts(zones, before):
             try:
-                return _Sweeping(search, zones, start).settled(most)
+                return _Sweeping(search, zones, start).settled(most_sweeps(zones))
             except SolveError:
                 continue
         return None
 
-    found = by_contact(problem, going, recover) if most_sweeps(given) else None
+    found = by_contact(problem, going, recover)
     if found is None:
         found = search.settled()
         if most_sweeps(given):
@@ -133,20 +132,25 @@ def solve_and_recover(
 
 def _constant(zone: ZoneScene, before: Equilibrium | None) -> bool:
     """Whether a zone had constants in the last step in place of a recovered pressure."""
-    field, recovery = before and before.fields.get(zone.zone.name), zone.operator.recovery
+    field, recovery = _last(zone, before), zone.operator.recovery
     return bool(field and recovery and field.form != recovery.form.name)
 
 
 def _starts(zones: Sequence[ZoneScene], before: Equilibrium | None) -> list[Equilibrium | None]:
-    """What sweeps go on from: the last step, where its axes are those of now, then nothing."""
+    """What sweeps go on from: the last step, where its axes are those of now; then nothing."""
     for zone in zones:
-        field, recovery = before and before.fields.get(zone.zone.name), zone.operator.recovery
+        field, recovery = _last(zone, before), zone.operator.recovery
         if not field or not recovery:
             return [None]
         axes = recovery.moments.local.axes
         if np.abs(axes - field.local.axes).max() > _TURNED * np.abs(axes).max():
             return [None]
     return [before, None]
+
+
+def _last(zone: ZoneScene, before: Equilibrium | None) -> PressureField | None:
+    """The pressure that a zone had in the last step, if there is one."""
+    return before.fields.get(zone.zone.name) if before else None
 
 
 class _Sweeping:

@@ -31,7 +31,7 @@ from .constraints import (
     moved,
     refuse_unsolvable,
 )
-from .contact_stiffness import contact_stiffness, gap_stiffness, refuse_unbalanced
+from .contact_stiffness import contact_stiffness, refuse_unbalanced, stiffness_of
 from .iterate import ContactIterate
 from .rest import AT_REST
 from .state import Equilibrium
@@ -194,13 +194,6 @@ class ContactProblem:
             return np.zeros(len(self.constraints.area), dtype=bool), self.constraints
         kept = ~np.isnan(imposed)
         return kept, self.constraints.with_jumps(np.where(kept, imposed, 0.0))
-
-    def equilibrium(
-        self, step: Step, closed: np.ndarray, correction: np.ndarray | float
-    ) -> Equilibrium:
-        """Equilibrium with the rows `closed` (k,) and no others, under further forces (n, dim)."""
-        first = self._at_rest(closed, step, correction)
-        return self._refined(first, _force_scale(first), correction)
 
     def with_jumps(
         self,
@@ -377,10 +370,14 @@ class ContactProblem:
         )
 
     def _gap_stiffness(self, step: Step, kept: np.ndarray) -> np.ndarray:
-        """See `gap_stiffness`; raises SolveError as `refuse_unbalanced` does."""
+        """See `stiffness_of`: of all that may close, but for what is `kept` (k,) closed.
+
+        Raises SolveError as `refuse_unbalanced` does.
+        """
+        base, sought = self.constraints, self.constraints.closable & ~kept
         loads = self.scene.given_loads(step)[0].ravel()
-        refuse_unbalanced(self.constraints, kept, self.unsupported, loads)
-        return gap_stiffness(self._systems, self.matrix, self.constraints, kept)
+        refuse_unbalanced(base.gaps[sought], base.gaps[kept], self.unsupported, loads)
+        return stiffness_of(self._systems, self.matrix, base, sought, kept)
 
     def contact_stiffness(self) -> tuple[np.ndarray | LinearOperator, np.ndarray]:
         """See `contact_stiffness`; made once, for all steps."""

@@ -92,14 +92,16 @@ def by_contact(
 ) -> Equilibrium | None:
     """What `recover` finds with all zones, or with those of the contacts that settle by themselves.
 
-    None where none does.
+    None where none does, or none has sweeps.
     """
+    if not most_sweeps(zones):
+        return None
     if (found := recover(zones)) is not None:
         return found
     contacts = [
         [zone for zone in zones if part.multipliers[zone.numbers].any()] for part in problem.parts
     ]
-    contacts = [contact for contact in contacts if contact]
+    contacts = [contact for contact in contacts if most_sweeps(contact)]
     if len(contacts) < 2:
         return None
     settled = [zone for contact in contacts if recover(contact) for zone in contact]
@@ -124,7 +126,7 @@ def _recovered(
         closed = found.state.status.closed
         return problem.solve(step, closed, correction=found.state.correction)
 
-    found = with_status(state, correct, wrong, again) if most else None
+    found = with_status(state, correct, wrong, again)
     if found is None:
         return None
     fields = {
