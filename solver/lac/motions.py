@@ -13,6 +13,8 @@ from scipy.sparse.csgraph import connected_components
 
 # Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
+SEEN = 1e-6
+"""Amplitudes below this share of the largest likewise."""
 # Smooth normals leave at least this share of what resists a motion, or facets alone resist it: of
 # a tapered pin all, of a wave four facets long 1/64; of pins in holes and balls in sockets 1e-4.
 _SMOOTH = 0.002
@@ -115,6 +117,31 @@ def unsupported(
     # Round-off entries would mix the bodies and fill the motions up.
     chosen = np.where(np.abs(vectors[:, free]) > _FREE, vectors[:, free], 0.0)
     return (motions @ sparse.csr_matrix(chosen)).tocsr()
+
+
+def holding(opened: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """The fewest rows (k,) of `opened` (k, r) that hold what rows `held` (j, r) leave free.
+
+    Both have what each of r motions changes in each row.
+
+    Two gaps see a body that moves, and a third one sees it turn:
+
+    >>> opened = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
+    >>> holding(opened, np.empty((0, 2))).tolist()
+    [True, False, True]
+    >>> holding(opened, opened[:1]).tolist()
+    [False, False, True]
+    """
+    from scipy.linalg import null_space, qr
+
+    rows = np.zeros(len(opened), dtype=bool)
+    free = null_space(held, SEEN) if len(held) else np.eye(opened.shape[1])
+    seen = opened @ free
+    if seen.size:
+        upper, order = qr(seen.T, mode="r", pivoting=True)
+        size = np.abs(np.diag(upper))
+        rows[order[: np.count_nonzero(size > SEEN * size[0])]] = True
+    return rows
 
 
 def unheld_motion(

@@ -303,3 +303,12 @@ def test_a_stiffness_that_is_factored_is_in_double_precision(monkeypatch):
     monkeypatch.setattr(problem, "SINGLE_FROM", 0)
     contact = ContactProblem(build_scene(block_case(3), block_mesh("HEXA8", "HEXA8", (3, 2))))
     assert contact.matrix.dtype == np.float64
+
+
+def test_a_start_that_leaves_a_body_free_is_no_end():
+    """Contact alone holds the upper block along y, and nothing is closed at the start."""
+    case = blocks(PRESSED)
+    pressed = ContactProblem(build_scene(case, block_mesh("QUAD4", "QUAD4", (4, 3), 50.0)))
+    found = pressed.solve(case.steps[0], np.zeros(len(pressed.constraints.area), dtype=bool))
+    assert found.pressure == pytest.approx(25.0, rel=1e-12)
+    assert found.status.iterations == 2

@@ -213,15 +213,15 @@ def test_steps_are_compared_where_their_share_of_the_last_one_is_known(name):
 
 
 def test_the_steps_before_one_without_a_solution_are_kept(tmp_path):
-    """Friction alone holds the upper block along x; some of it slips, and then nothing presses."""
-    path = "steps: [{press: 1, weight: 1}, {press: 2, weight: 1}, {press: 0, weight: 0}]\n"
+    """Friction alone holds the upper block along x; some of it slips, and then all of it does."""
+    path = "steps: [{press: 1, weight: 1}, {press: 2, weight: 1}, {press: 0, weight: 1}]\n"
     given = CASE.replace("  - {group: symx, fix: [x]}\n", "").replace("fix: [y]", "fix: [x, y]")
     given = given.replace("_contact}]", "_contact, friction: 0.4}]").replace("[0, -8", "[9, -8")
     case = tmp_path / "steps.yaml"
     case.write_text(given.replace("size: 1.0", PARTS) + path)
     verdict = solve(Job(case), tmp_path / "result.vtkhdf", tmp_path / "verdict.json")
     assert (verdict.verdict, verdict.passed) == ("failed", False)
-    assert verdict.reason.startswith("step 3 (press 0, weight 0): nothing keeps top from a free")
+    assert verdict.reason.startswith("step 3 (press 0, weight 1): nothing keeps top from a free")
     again = read_result(tmp_path / "result.vtkhdf").solution
     pressures = [step.resultants["zone"].force[1] for step in again.steps]
     assert pressures == pytest.approx([-33, -58])

@@ -12,9 +12,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import lstsq, null_space
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
+from ...lac.motions import SEEN, holding
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
 from .contacts import Contacts
@@ -65,6 +67,8 @@ class Search:
         self.count = 0
         self._unmoved: _Unmoved | None = None
         problem.gives_way_where(np.ones(len(numbers), dtype=bool))
+        # Where nothing acts, what presses is rounding or is left from other steps.
+        self._acts = any(given.any() for given in problem.scene.acting(step))
 
     def settled(
         self, correction: np.ndarray | float = 0.0, on_the_way: bool = False
@@ -105,13 +109,16 @@ class Search:
 
         scale = max(float(np.abs(at_rest).max(initial=0.0)), at_work)
         enough = _ON_THE_WAY if on_the_way else _EXACT
-        for nothing in (AT_REST, FAINT):
+        for nothing in (AT_REST, FAINT) if self._acts else (FAINT,):
             solution = contact.solve(at_rest, gone, last, at_work, nothing * at_work, rest)
             if solution is None:
                 break
             forces, z, steps = solution
             _LOG.info("friction: %d Newton steps", steps)
-            if corrected := self._corrected(z, scale, correction, enough):
+            corrected = self._corrected(z, scale, correction, enough)
+            forces = corrected[1] if corrected else forces
+            # What pressed by rounding has let go of a body, and is at rest.
+            if corrected and (nothing > AT_REST or contact.faintest(forces) > AT_REST * at_work):
                 found, forces, z = corrected
                 found = self._freed(forces, z, correction) or found
                 state = self._with_status(found, *contact.statuses(forces, z))
@@ -126,10 +133,11 @@ class Search:
         Those under other forces follow from the first ones: what is found with them is corrected.
         """
         if self._unmoved is None:
-            found = self._imposed(
-                np.zeros(int(self.problem.constraints.eligible.sum())), correction
-            )
+            nowhere = np.zeros(int(self.problem.constraints.eligible.sum()))
+            found = self._imposed(nowhere, correction)
+            last = self.problem.constraints.covered * (0.0 if self.last is None else self.last)
             at_work = forces_at_work(self.problem.scene, found.displacement)
+            at_work = max(at_work, float(np.abs(last).max()))
             self._unmoved = _Unmoved(found.correction, found.pressure, at_work)
             return found.pressure, at_work
         known = self._unmoved
@@ -148,9 +156,14 @@ class Search:
         """
         base = self.problem.constraints
         kept = self._of_all(self._contact.kept(~gaps))
-        imposed = np.where(kept, self.jump + self._of_all(z), np.nan)
+        slips = base.eligible & ~base.normal & ~kept
+        still = self._holding(slips, kept | base.closable)
+        imposed = np.where(kept | still, self.jump + self._of_all(z), np.nan)
         try:
             found = self.problem.solve(self.step, self.closed, imposed, correction)
+            if still.any():
+                imposed[still] += self._back(found.gap - self.jump, slips, kept)[still]
+                found = self.problem.solve(self.step, self.closed, imposed, correction)
         except SolveError:
             raise SolveError(self._why_none()) from None
         # Where all others may bear tension up to their limit, one may bear what balances them.
@@ -160,17 +173,47 @@ class Search:
             raise SolveError(self._why_none())
         return found
 
+    def _back(self, jump: np.ndarray, slips: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """What slips (k,) change by as bodies that no gap holds move to where they slip least.
+
+        That is in the mean square of some `slips` (k,), which have a `jump` (k,).
+        """
+        base, seen = self.problem.constraints, self._opened
+        free = null_space(seen[kept | base.closable], SEEN)
+        root = np.sqrt(base.covered[slips])
+        motion, *_ = lstsq(root[:, None] * (seen[slips] @ free), -root * jump[slips])
+        return np.asarray(seen @ (free @ motion))
+
     def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
-        """Equilibrium in which nothing presses, so that nothing rubs."""
+        """Equilibrium in which nothing presses, so that nothing rubs.
+
+        No more contact holds bodies than must: surfaces that do not fit by rounding would press.
+        """
         base, everywhere = self.problem.constraints, np.ones(self._contact.m, dtype=bool)
         nowhere = np.zeros(int(base.eligible.sum()))
         found = self._unpressed(everywhere, nowhere, at_work, correction)
-        none = np.zeros_like(found.pressure)
-        trial = replace(found.trial, pressure=none, gap=found.gap - self.jump)
-        closed = found.status.closed[base.eligible][: self._contact.m]
-        slipping = closed[self._contact.of]
-        found = replace(found, trial=trial)
-        return self._judged(found, self._with_status(found, closed, slipping))
+        touching = np.where(base.normal, found.status.closed, base.eligible)
+        held = self._holding(touching, np.zeros_like(touching))
+        jump = np.where(held, found.gap - self.jump, 0.0)
+        found = self.problem.with_jumps(self.step, held, jump, self.jump, correction)
+        nothing = np.zeros_like(found.pressure)
+        found = replace(found, trial=replace(found.trial, pressure=nothing))
+        touching |= found.gap <= AT_REST * np.abs(found.displacement).max()
+        closed = touching[base.eligible][: self._contact.m]
+        return self._judged(found, self._with_status(found, closed, closed[self._contact.of]))
+
+    def _holding(self, among: np.ndarray, held: np.ndarray) -> np.ndarray:
+        """The fewest rows (k,) `among` some (k,) that hold what the `held` ones (k,) leave free."""
+        found = np.zeros(len(self.jump), dtype=bool)
+        found[among] = holding(self._opened[among], self._opened[held])
+        return found
+
+    @cached_property
+    def _opened(self) -> np.ndarray:
+        """The mean gap or slip (k, r) of all rows by each motion that supports leave free."""
+        base = self.problem.constraints
+        seen = (base.gaps @ self.problem.unsupported).toarray()
+        return np.asarray(seen / np.where(base.eligible, base.covered, np.inf)[:, None])
 
     def _corrected(
         self, z: np.ndarray, scale: float, correction: np.ndarray | float, enough: float

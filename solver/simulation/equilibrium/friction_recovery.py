@@ -3,8 +3,9 @@
 The traction is q* = q + Σ c ψ on the master, as the pressure is p*. What slips has q* = −μp* d, so
 that its coefficients are −μ d times those of the pressure. What sticks keeps those of the last
 step; what its traction changes by is reconstructed among macro-elements that stick, as it has a
-kink where slip begins. The sweeps are those of `lac.recovery`. They go on from those of the last
-step until they settle: nothing changes where loads stay the same.
+kink where slip begins. None of it varies by more than the bound of its mean, or by a larger share
+of the pressure than in the last step. The sweeps are those of `lac.recovery`. They go on from those
+of the last step until they settle: nothing changes where loads stay the same.
 """
 
 import logging
@@ -69,15 +70,22 @@ class _Loads:
         if not self.zone.slips:
             return []
         c = self.fit.coefficients(values).reshape(len(self.sticks), -1)
-        sliding = [(slide[:, None] * c).ravel() for slide in self.slide.T]
-        kept = [np.zeros_like(each) for each in sliding]
+        pressure = np.maximum(values[self.zone.numbers], 0.0)
+        bound = self.zone.zone.friction * pressure
+        sliding = self.slide.T[..., None] * c
+        held = np.zeros_like(sliding)
         if self.before:
             values = values - self.before.pressure
-            sticks = np.repeat(self.sticks, c.shape[1])
-            kept = [sticks * each for each in self.before.fields[self.zone.zone.name].tractions]
+            last = np.array(self.before.fields[self.zone.zone.name].tractions)
+            held += self.sticks[:, None] * last.reshape(held.shape)
+            then = self.before.pressure[self.zone.numbers]
+            share = np.divide(pressure, then, out=np.zeros_like(then), where=then > 0)
+            bound = np.maximum(bound, share * _largest(held))
         changed = self._stuck @ np.concatenate([values[rows] for rows in self.zone.slips])
-        parts = zip(sliding, kept, np.split(changed, len(sliding)), strict=True)
-        return [slides + before + change for slides, before, change in parts]
+        held += changed.reshape(held.shape)
+        size = _largest(held)
+        held *= np.divide(bound, size, out=np.ones_like(size), where=size > bound)[:, None]
+        return list((sliding + held).reshape(len(held), -1))
 
     @cached_property
     def _stuck(self) -> sparse.csr_matrix:
@@ -100,6 +108,11 @@ class _Loads:
         for loads, c in zip(recovery.slip_loads, self.tractions(values), strict=True):
             total = total + loads.T @ c
         return np.asarray(total)
+
+
+def _largest(tractions: np.ndarray) -> np.ndarray:
+    """The largest coefficient (m,) of tractions by tangent (dim − 1, m, k)."""
+    return np.asarray(np.linalg.norm(tractions, axis=0).max(axis=-1))
 
 
 def solve_and_recover(

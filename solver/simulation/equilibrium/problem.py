@@ -146,7 +146,7 @@ class ContactProblem:
         `correction` (n, dim): see `Equilibrium`. Raises SolveError where no status fulfils p ≥ 0,
         ḡ ≥ 0, p ḡ = 0, or a system is singular.
         """
-        scene, (kept, constraints) = self.scene, self._keeping(imposed)
+        scene, (imposed, kept, constraints) = self.scene, self._keeping(imposed)
         eligible = constraints.closable & ~kept
 
         def free_motion(closed: np.ndarray) -> str:
@@ -186,14 +186,19 @@ class ContactProblem:
         status = find_status(attempt, start, eligible, area, stiffness, confirm, guess)
         trial = latest[0].trial
         touching = self.constraints.unloaded & (trial.gap <= trial.gap_limit)
-        return replace(latest[0], status=replace(status, closed=status.closed | kept | touching))
+        status = replace(status, closed=status.closed | kept | touching)
+        trial = replace(trial, gap=np.where(kept, imposed, trial.gap))
+        return replace(latest[0], trial=trial, status=status)
 
-    def _keeping(self, imposed: np.ndarray | None) -> tuple[np.ndarray, ContactConstraints]:
-        """Which rows (k,) keep what is `imposed`, and the constraints with that."""
+    def _keeping(
+        self, imposed: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, ContactConstraints]:
+        """What rows (k,) keep, NaN in others; which do, and the constraints with that."""
         if imposed is None:
-            return np.zeros(len(self.constraints.area), dtype=bool), self.constraints
+            imposed = np.full(len(self.constraints.area), np.nan)
+            return imposed, np.zeros(len(imposed), dtype=bool), self.constraints
         kept = ~np.isnan(imposed)
-        return kept, self.constraints.with_jumps(np.where(kept, imposed, 0.0))
+        return imposed, kept, self.constraints.with_jumps(np.where(kept, imposed, 0.0))
 
     def with_jumps(
         self,
