@@ -9,6 +9,7 @@ from solver import solve_case
 from solver.case.reader import load_case, parse_case
 from solver.lac import recovery as sweeps
 from solver.lac.errors import SolveError
+from solver.mechanics.mortar import coulomb
 from solver.mechanics.mortar.coulomb import CoulombContact
 from solver.simulation.equilibrium import contact_stiffness
 from solver.simulation.equilibrium import recovery as batch
@@ -134,6 +135,18 @@ def test_newton_goes_on_from_forces_that_act():
     following, fault = contact.corrected(exact[0], exact[1], np.abs(start).max())
     assert fault < 1e-15
     np.testing.assert_allclose(following, exact[1])
+
+
+def test_a_way_that_only_the_shortest_parts_follow_has_an_end():
+    """A thousand parts of 1/1000 would lead there; each is a search of its own."""
+    tried = []
+
+    def found_at(gone, z):
+        tried.append(gone)
+        return (None, np.full_like(z, gone), 1) if gone - z[0] < 2e-3 else None
+
+    assert coulomb._by_way(np.zeros(1), 1.0, 0.1, found_at) is None
+    assert len(tried) == 50
 
 
 def test_newton_keeps_the_law_in_space():

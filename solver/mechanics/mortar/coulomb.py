@@ -46,8 +46,9 @@ UNIQUE = 1.0
 _FREE, _WEAK = 1e6, 1e-8
 # A step of the line search is halved down to this.
 _SHORTEST = 1e-3
-# Of a way between forces, the share that is tried first; of any way, the smallest part.
-_FIRST, _SMALLEST = 0.1, 1e-4
+# Of a way between forces, the share that is tried first; of any way, the smallest part, and how
+# many are tried: ways that lead to a state took 14 at most.
+_FIRST, _SMALLEST, _TRIED = 0.1, 1e-4, 50
 # Where S is a product: the fault that Newton's method ends with, the shares of a fault that GMRES
 # leaves of a large one and at most, its restart and restarts.
 _INEXACT, _SHARE, _LARGEST, _RESTART, _RESTARTS = 1e-6, 0.1, 1e-2, 200, 5
@@ -366,11 +367,13 @@ def _by_way(
     `found_at` takes how far it has gone, and the z found before. Its parts, the first one `step`,
     are as large as succeed.
     """
-    gone, found = 0.0, None
-    while gone < end:
+    gone = 0.0
+    for _ in range(_TRIED):
         after = min(gone + step, end)
         if (found := found_at(after, z)) is not None:
+            if after == end:
+                return found
             z, gone, step = found[1], after, 2 * step
         elif (step := step / 2) < _SMALLEST:
-            return None
-    return found
+            break
+    return None
