@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from solver import solve_case
+from solver.lac.errors import SolveError
 from tests.views.judge import rounded
 
 # Friction alone holds the upper block along x.
@@ -149,3 +150,41 @@ def test_a_light_step_that_opens_most_faces_is_as_if_there_had_been_no_heavy_one
     assert np.count_nonzero(alone.multiplier) == 2
     assert after.multiplier == pytest.approx(alone.multiplier, rel=1e-6)
     assert np.abs(after.friction.slip).max() < 1e-9 * factor
+
+
+def test_a_block_that_is_pressed_away_does_not_rest():
+    """It is pressed down on a round surface, from which friction cannot keep it from rolling."""
+    case = {
+        "name": "rolls",
+        "mesh": {
+            "recipe": "blocks",
+            "size": [1.564347649063861, 1.682969211770967, 1.3778093409655192],
+            "bottom": {"cells": "TETRA4", "divisions": [1, 1, 1]},
+            "top": {"cells": "TETRA10", "divisions": [1, 1, 1]},
+        },
+        "materials": {"all": {"young": 638.5, "poisson": 0.3}},
+        "supports": [
+            {"group": "symx", "fix": ["normal"]},
+            {"group": "press", "fix": {"normal": -0.00944823405392332}},
+        ],
+        "bodies": {
+            "floor": {
+                "parabola": {
+                    "point": [0.0, 0.0, -1.3778093409655192],
+                    "normal": [0.0, 0.0, 1.0],
+                    "radius": 30.0,
+                }
+            }
+        },
+        "contact": [
+            {
+                "name": "between",
+                "slave": "bottom_contact",
+                "master": "top_contact",
+                "friction": 0.1,
+            },
+            {"name": "below", "slave": "base", "master": "floor", "friction": 0.1},
+        ],
+    }
+    with pytest.raises(SolveError, match="overcome friction"):
+        solve_case(case)

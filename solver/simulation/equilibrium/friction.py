@@ -68,7 +68,7 @@ class Search:
         self._unmoved: _Unmoved | None = None
         problem.gives_way_where(np.ones(len(numbers), dtype=bool))
         # Where nothing acts, what presses is rounding or is left from other steps.
-        self._acts = any(given.any() for given in problem.scene.acting(step))
+        self._acts = self._act_on(np.ones(len(numbers), dtype=bool))
 
     def settled(
         self, correction: np.ndarray | float = 0.0, on_the_way: bool = False
@@ -151,12 +151,13 @@ class Search:
         """Equilibrium in which nothing presses some `gaps` (m,), without friction there.
 
         The others, of other bodies, keep what they have of z (r,). A body that its loads have left
-        may be in many places: this one touches another body. Raises SolveError if the search
-        without friction finds no such state.
+        may be in many places: this one touches another body, and stays where no gap holds it.
+        Raises SolveError if the search without friction finds no such state.
         """
         base = self.problem.constraints
         kept = self._of_all(self._contact.kept(~gaps))
-        slips = base.eligible & ~base.normal & ~kept
+        rests = self._of_all(self._contact.kept(gaps))
+        slips = rests & ~base.normal & (not self._act_on(rests))
         still = self._holding(slips, kept | base.closable)
         imposed = np.where(kept | still, self.jump + self._of_all(z), np.nan)
         try:
@@ -172,6 +173,13 @@ class Search:
         if (pressed[base.eligible][: len(gaps)][gaps] > AT_REST * at_work).any():
             raise SolveError(self._why_none())
         return found
+
+    def _act_on(self, rows: np.ndarray) -> bool:
+        """Whether loads or imposed displacements act on the bodies that some rows (k,) see."""
+        scene = self.problem.scene
+        seen = scene.body[self.problem.constraints.gaps[rows].indices // scene.space]
+        mine, (force, offset) = np.isin(scene.body, seen), scene.acting(self.step)
+        return bool(force[mine].any() or offset.reshape(force.shape)[mine].any())
 
     def _back(self, jump: np.ndarray, slips: np.ndarray, kept: np.ndarray) -> np.ndarray:
         """What slips (k,) change by as bodies that no gap holds move to where they slip least.
