@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import connected_components
 
 # Eigenvalues below this share of the largest belong to unresisted motions.
 _FREE = 1e-12
-SEEN = 1e-6
-"""Amplitudes below this share of the largest likewise."""
+# The same in amplitudes.
+_SEEN = 1e-6
 # Smooth normals leave at least this share of what resists a motion, or facets alone resist it: of
 # a tapered pin all, of a wave four facets long 1/64; of pins in holes and balls in sockets 1e-4.
 _SMOOTH = 0.002
@@ -119,6 +119,19 @@ def unsupported(
     return (motions @ sparse.csr_matrix(chosen)).tocsr()
 
 
+def unseen(rows: np.ndarray) -> np.ndarray:
+    """The combinations (r, f) of r motions that change nothing in `rows` (k, r).
+
+    >>> np.abs(unseen(np.array([[1.0, 0.0], [2.0, 0.0]]))).round(12).tolist()
+    [[0.0], [1.0]]
+    """
+    from scipy.linalg import null_space
+
+    if not rows.size:
+        return np.eye(rows.shape[1])
+    return np.asarray(null_space(np.linalg.qr(rows, mode="r"), _SEEN))
+
+
 def holding(opened: np.ndarray, held: np.ndarray) -> np.ndarray:
     """The fewest rows (k,) of `opened` (k, r) that hold what rows `held` (j, r) leave free.
 
@@ -132,15 +145,13 @@ def holding(opened: np.ndarray, held: np.ndarray) -> np.ndarray:
     >>> holding(opened, opened[:1]).tolist()
     [False, False, True]
     """
-    from scipy.linalg import null_space, qr
+    from scipy.linalg import qr
 
-    rows = np.zeros(len(opened), dtype=bool)
-    free = null_space(held, SEEN) if len(held) else np.eye(opened.shape[1])
-    seen = opened @ free
+    rows, seen = np.zeros(len(opened), dtype=bool), opened @ unseen(held)
     if seen.size:
         upper, order = qr(seen.T, mode="r", pivoting=True)
         size = np.abs(np.diag(upper))
-        rows[order[: np.count_nonzero(size > SEEN * size[0])]] = True
+        rows[order[: np.count_nonzero(size > _SEEN * size[0])]] = True
     return rows
 
 

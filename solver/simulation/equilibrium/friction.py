@@ -12,11 +12,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lstsq, null_space
+from scipy.linalg import lstsq
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
-from ...lac.motions import SEEN, holding
+from ...lac.motions import holding, unseen
 from ...lac.status import StatusResult
 from ...mechanics.mortar.coulomb import CoulombContact
 from .contacts import Contacts
@@ -187,7 +187,7 @@ class Search:
         That is in the mean square of some `slips` (k,), which have a `jump` (k,).
         """
         base, seen = self.problem.constraints, self._opened
-        free = null_space(seen[kept | base.closable], SEEN)
+        free = unseen(seen[kept | base.closable])
         root = np.sqrt(base.covered[slips])
         motion, *_ = lstsq(root[:, None] * (seen[slips] @ free), -root * jump[slips])
         return np.asarray(seen @ (free @ motion))
