@@ -132,26 +132,24 @@ def unseen(rows: np.ndarray) -> np.ndarray:
     return np.asarray(null_space(np.linalg.qr(rows, mode="r"), _SEEN))
 
 
-def holding(opened: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """The fewest rows (k,) of `opened` (k, r) that hold what rows `held` (j, r) leave free.
+def holding(seen: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """The fewest rows (k,) `among` some (k,) that hold all that these hold.
 
-    Both have what each of r motions changes in each row.
+    `seen` (k, r): what each of r motions changes in each row.
 
     Two gaps see a body that moves, and a third one sees it turn:
 
-    >>> opened = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
-    >>> holding(opened, np.empty((0, 2))).tolist()
+    >>> seen = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
+    >>> holding(seen, np.array([True, True, True])).tolist()
     [True, False, True]
-    >>> holding(opened, opened[:1]).tolist()
-    [False, False, True]
     """
     from scipy.linalg import qr
 
-    rows, seen = np.zeros(len(opened), dtype=bool), opened @ unseen(held)
-    if seen.size:
-        upper, order = qr(seen.T, mode="r", pivoting=True)
+    rows, numbers = np.zeros(len(seen), dtype=bool), np.flatnonzero(among)
+    if seen[among].size:
+        upper, order = qr(seen[among].T, mode="r", pivoting=True)
         size = np.abs(np.diag(upper))
-        rows[order[: np.count_nonzero(size > _SEEN * size[0])]] = True
+        rows[numbers[order[: np.count_nonzero(size > _SEEN * size[0])]]] = True
     return rows
 
 

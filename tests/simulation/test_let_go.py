@@ -7,61 +7,57 @@ from solver import solve_case
 from solver.lac.errors import SolveError
 from tests.views.judge import rounded
 
+
+def blocks(size, bottom, top, **rest):
+    """A block on another one; `bottom` and `top` are their cells and divisions."""
+    parts = (dict(zip(("cells", "divisions"), part, strict=True)) for part in (bottom, top))
+    bodies = dict(zip(("bottom", "top"), parts, strict=True))
+    return {"name": "blocks", "mesh": {"recipe": "blocks", "size": size, **bodies}, **rest}
+
+
+def zone(friction, recovery="none"):
+    """The zone between the blocks, slave below."""
+    surfaces = {"slave": "bottom_contact", "master": "top_contact"}
+    return {"name": "between", **surfaces, "friction": friction, "recovery": recovery}
+
+
+def exchanged(zone):
+    """The zone with the upper block as slave."""
+    return zone | {"slave": zone["master"], "master": zone["slave"]}
+
+
 # Friction alone holds the upper block along x.
-BLOCK = {
-    "name": "let-go",
-    "mesh": {
-        "recipe": "blocks",
-        "size": 1.0,
-        "bottom": {"cells": "QUAD4", "divisions": [3, 3]},
-        "top": {"cells": "QUAD8", "divisions": [2, 2]},
-    },
-    "plane": "strain",
-    "materials": {"all": {"young": 2000.0, "poisson": 0.3}},
-    "supports": [{"group": "base", "fix": ["x", "y"]}],
-    "loads": [
+BLOCK = blocks(
+    1.0,
+    ("QUAD4", [3, 3]),
+    ("QUAD8", [2, 2]),
+    plane="strain",
+    materials={"all": {"young": 2000.0, "poisson": 0.3}},
+    supports=[{"group": "base", "fix": ["x", "y"]}],
+    loads=[
         {"group": "press", "pressure": 0.025},
         {"group": "press", "traction": [0.009, -0.008]},
     ],
-    "contact": [
-        {
-            "name": "zone",
-            "slave": "bottom_contact",
-            "master": "top_contact",
-            "friction": 0.4,
-        }
-    ],
-}
+    contact=[zone(0.4)],
+)
 # Around an axis: all of it sticks, and faces are pressed by different pressures.
-PARTS = {
-    "name": "light",
-    "mesh": {
-        "recipe": "blocks",
-        "size": [0.9, 1.0],
-        "bottom": {"cells": "QUAD9", "divisions": [3, 2]},
-        "top": {"cells": "QUAD8", "divisions": [3, 2]},
-    },
-    "plane": "axisymmetric",
-    "materials": {
+PARTS = blocks(
+    [0.9, 1.0],
+    ("QUAD9", [3, 2]),
+    ("QUAD8", [3, 2]),
+    plane="axisymmetric",
+    materials={
         "bottom": {"young": 60.0, "poisson": 0.0},
         "top": {"young": 62.0, "poisson": 0.4999},
     },
-    "supports": [
+    supports=[
         {"group": "symx", "fix": ["normal"]},
         {"group": "base", "fix": ["normal"]},
         {"group": "press", "fix": {"normal": -0.0089}},
     ],
-    "loads": [],
-    "contact": [
-        {
-            "name": "between",
-            "slave": "top_contact",
-            "master": "bottom_contact",
-            "friction": 0.3,
-            "recovery": "smooth",
-        }
-    ],
-}
+    loads=[],
+    contact=[exchanged(zone(0.3, "smooth"))],
+)
 
 
 def of_top(solved):
@@ -73,15 +69,15 @@ def test_a_block_that_is_let_go_moves_to_where_it_slips_least():
     """Its faces slip back by different ways, by none on the average, and nothing is strained."""
     solved = solve_case(BLOCK | {"steps": [1.0, 2.0, 0.0]})
     assert solved.verdict == "solved"
-    (zone,) = solved.solution.zones
-    assert not zone.multiplier.any()
-    assert not zone.friction.friction_traction.any()
-    moved, slip = of_top(solved), zone.friction.slip[:, 0]
+    (found,) = solved.solution.zones
+    assert not found.multiplier.any()
+    assert not found.friction.friction_traction.any()
+    moved, slip = of_top(solved), found.friction.slip[:, 0]
     assert moved[:, 0].mean() > 1e-6
     assert np.ptp(moved, axis=0) == pytest.approx([0, 0], abs=1e-17)
     assert moved[:, 1] == pytest.approx(0, abs=1e-17)
     assert slip.max() > 1e-6
-    assert slip @ zone.area == pytest.approx(0, abs=1e-17)
+    assert slip @ found.area == pytest.approx(0, abs=1e-17)
 
 
 def test_nor_do_surfaces_that_do_not_fit_by_rounding_hold_it():
@@ -124,26 +120,22 @@ def test_a_step_without_loads_leaves_nothing_after_a_heavy_one():
 @pytest.mark.parametrize("form", ["linear", "smooth"])
 def test_a_light_step_that_opens_most_faces_is_as_if_there_had_been_no_heavy_one(form, factor):
     """Two of six faces bear the light load and stick, as do all under the heavy one."""
-    case = {
-        "name": "eccentric",
-        "mesh": {
-            "recipe": "blocks",
-            "size": [0.9, 1.0],
-            "bottom": {"cells": "QUAD9", "divisions": [5, 3]},
-            "top": {"cells": "QUAD8", "divisions": [6, 3]},
-        },
-        "plane": "strain",
-        "materials": {
+    case = blocks(
+        [0.9, 1.0],
+        ("QUAD9", [5, 3]),
+        ("QUAD8", [6, 3]),
+        plane="strain",
+        materials={
             "bottom": {"young": 60.0, "poisson": 0.45},
             "top": {"young": 62.0, "poisson": 0.2},
         },
-        "supports": [{"group": "base", "fix": ["x", "y"]}],
-        "loads": [
+        supports=[{"group": "base", "fix": ["x", "y"]}],
+        loads=[
             {"group": "press", "pressure": 1.0, "name": "heavy"},
             {"group": "press", "traction": [0, f"-{factor}*(1 - 1.4*x/0.9)"], "name": "light"},
         ],
-        "contact": [PARTS["contact"][0] | {"friction": 0.5, "recovery": form}],
-    }
+        contact=[exchanged(zone(0.5, form))],
+    )
     path = [{"heavy": 1, "light": 0}, {"heavy": 0, "light": 1}]
     alone, after = (solve_case(case | {"steps": path[n:]}).solution.zones[0] for n in (1, 0))
     assert not alone.friction.slip.any()
@@ -154,37 +146,22 @@ def test_a_light_step_that_opens_most_faces_is_as_if_there_had_been_no_heavy_one
 
 def test_a_block_that_is_pressed_away_does_not_rest():
     """It is pressed down on a round surface, from which friction cannot keep it from rolling."""
-    case = {
-        "name": "rolls",
-        "mesh": {
-            "recipe": "blocks",
-            "size": [1.564347649063861, 1.682969211770967, 1.3778093409655192],
-            "bottom": {"cells": "TETRA4", "divisions": [1, 1, 1]},
-            "top": {"cells": "TETRA10", "divisions": [1, 1, 1]},
-        },
-        "materials": {"all": {"young": 638.5, "poisson": 0.3}},
-        "supports": [
+    height = 1.3778093409655192
+    dome = {"point": [0.0, 0.0, -height], "normal": [0.0, 0.0, 1.0], "radius": 30.0}
+    case = blocks(
+        [1.564347649063861, 1.682969211770967, height],
+        ("TETRA4", [1, 1, 1]),
+        ("TETRA10", [1, 1, 1]),
+        materials={"all": {"young": 638.5, "poisson": 0.3}},
+        supports=[
             {"group": "symx", "fix": ["normal"]},
             {"group": "press", "fix": {"normal": -0.00944823405392332}},
         ],
-        "bodies": {
-            "floor": {
-                "parabola": {
-                    "point": [0.0, 0.0, -1.3778093409655192],
-                    "normal": [0.0, 0.0, 1.0],
-                    "radius": 30.0,
-                }
-            }
-        },
-        "contact": [
-            {
-                "name": "between",
-                "slave": "bottom_contact",
-                "master": "top_contact",
-                "friction": 0.1,
-            },
+        bodies={"floor": {"parabola": dome}},
+        contact=[
+            zone(0.1),
             {"name": "below", "slave": "base", "master": "floor", "friction": 0.1},
         ],
-    }
+    )
     with pytest.raises(SolveError, match="overcome friction"):
         solve_case(case)

@@ -14,6 +14,7 @@ from solver.mechanics.mortar.coulomb import CoulombContact
 from solver.simulation.equilibrium import (
     accuracy,
     contact_stiffness,
+    friction,
     friction_recovery,
     recovery,
 )
@@ -120,18 +121,12 @@ def all_or_none(_problem, zones, recover):
     return recover(zones)
 
 
-def all_that_touch(true):
+def all_that_touch(seen, among):
     """All gaps that touch hold a body that nothing presses."""
-
-    def holding(search, among, held):
-        return (
-            true(search, among, held) if held.any() else among & search.problem.constraints.normal
-        )
-
-    return holding
+    return among & (seen.shape[1] > 0)
 
 
-def stays(_search, jump, _slips, _kept):
+def stays(_search, jump, _slips, _seen):
     """Where no gap holds a body, some of its faces do not slip: which ones, rounding chooses."""
     return np.zeros_like(jump)
 
@@ -158,7 +153,7 @@ PLANTED = {
     "sideways": (accuracy, "LITTLE", 0.0),
     "held": (ContactProblem, "solve", alone(ContactProblem.solve)),
     "settles": (friction_recovery, "by_contact", all_or_none),
-    "loosened": (Search, "_holding", all_that_touch(Search._holding)),
+    "loosened": (friction, "holding", all_that_touch),
     "set_down": (Search, "_back", stays),
 }
 

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lstsq
 
 from ...case.acting import Step
 from ...lac.errors import SolveError
@@ -158,15 +157,16 @@ class Search:
         kept = self._of_all(self._contact.kept(~gaps))
         rests = self._of_all(self._contact.kept(gaps))
         slips = rests & ~base.normal & (not self._act_on(rests))
-        still = self._holding(slips, kept | base.closable)
+        seen = self._opened @ unseen(self._opened[kept | base.closable])
+        still = holding(seen, slips)
         imposed = np.where(kept | still, self.jump + self._of_all(z), np.nan)
         try:
             found = self.problem.solve(self.step, self.closed, imposed, correction)
-            if still.any():
-                imposed[still] += self._back(found.gap - self.jump, slips, kept)[still]
-                found = self.problem.solve(self.step, self.closed, imposed, correction)
         except SolveError:
             raise SolveError(self._why_none()) from None
+        if still.any():
+            gap = found.gap + self._back(found.gap - self.jump, slips, seen)
+            found = replace(found, trial=replace(found.trial, gap=gap))
         # Where all others may bear tension up to their limit, one may bear what balances them.
         limit = max(int((found.status.closed & ~kept).sum()), 1) * found.trial.pressure_limit
         pressed = base.covered * np.maximum(found.pressure - limit, 0.0)
@@ -181,16 +181,15 @@ class Search:
         mine, (force, offset) = np.isin(scene.body, seen), scene.acting(self.step)
         return bool(force[mine].any() or offset.reshape(force.shape)[mine].any())
 
-    def _back(self, jump: np.ndarray, slips: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    def _back(self, jump: np.ndarray, slips: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """What slips (k,) change by as bodies that no gap holds move to where they slip least.
 
-        That is in the mean square of some `slips` (k,), which have a `jump` (k,).
+        That is in the mean square of some `slips` (k,), which have a `jump` (k,); `seen` (k, f): by
+        each motion that is free.
         """
-        base, seen = self.problem.constraints, self._opened
-        free = unseen(seen[kept | base.closable])
-        root = np.sqrt(base.covered[slips])
-        motion, *_ = lstsq(root[:, None] * (seen[slips] @ free), -root * jump[slips])
-        return np.asarray(seen @ (free @ motion))
+        root = np.sqrt(self.problem.constraints.covered[slips])
+        motion, *_ = np.linalg.lstsq(root[:, None] * seen[slips], -root * jump[slips])
+        return np.where(slips, seen @ motion, 0.0)
 
     def _resting(self, at_work: float, correction: np.ndarray | float) -> Equilibrium:
         """Equilibrium in which nothing presses, so that nothing rubs.
@@ -201,7 +200,7 @@ class Search:
         nowhere = np.zeros(int(base.eligible.sum()))
         found = self._unpressed(everywhere, nowhere, at_work, correction)
         touching = np.where(base.normal, found.status.closed, base.eligible)
-        held = self._holding(touching, np.zeros_like(touching))
+        held = holding(self._opened, touching)
         jump = np.where(held, found.gap - self.jump, 0.0)
         found = self.problem.with_jumps(self.step, held, jump, self.jump, correction)
         nothing = np.zeros_like(found.pressure)
@@ -209,12 +208,6 @@ class Search:
         touching |= found.gap <= AT_REST * np.abs(found.displacement).max()
         closed = touching[base.eligible][: self._contact.m]
         return self._judged(found, self._with_status(found, closed, closed[self._contact.of]))
-
-    def _holding(self, among: np.ndarray, held: np.ndarray) -> np.ndarray:
-        """The fewest rows (k,) `among` some (k,) that hold what the `held` ones (k,) leave free."""
-        found = np.zeros(len(self.jump), dtype=bool)
-        found[among] = holding(self._opened[among], self._opened[held])
-        return found
 
     @cached_property
     def _opened(self) -> np.ndarray:
